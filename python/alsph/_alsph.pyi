@@ -1,0 +1,60 @@
+"""The compiled engine (Rust). Use it through :class:`alsph.Simulation`."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+class SolverError(RuntimeError):
+    """The computation broke down; ``args[0]`` names step, time, particle, position and field."""
+
+class ConfigError(ValueError):
+    """The settings or the arrays cannot be used; ``args[0]`` says what, where and how to mend it."""
+
+class Simulation:
+    """State and stepping of one simulation in 2-D or 3-D."""
+
+    def __init__(self, settings: str, state: dict[str, Any], threads: int | None = None) -> None: ...
+    @property
+    def dimensions(self) -> int: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def step(self) -> int: ...
+    @property
+    def threads(self) -> int: ...
+    @property
+    def counts(self) -> dict[str, int]:
+        """Particles by kind: ``fluid``, ``inlet``, ``outlet``, ``solid``."""
+
+    def advance(self, steps: int, wall_seconds: float | None = None) -> int:
+        """Take up to `steps` steps, stop early after `wall_seconds`; return the steps taken."""
+
+    def advance_until(self, time: float, wall_seconds: float | None = None) -> bool:
+        """Step until ``self.time >= time`` (True) or `wall_seconds` have passed (False). Δt is never clipped to `time`."""
+
+    def take_history(self) -> dict[str, NDArray[Any]]:
+        """One row for each step since the last call, see docs/architecture.md for the columns."""
+
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """Return the particles: the arrays of `state` and ``volume``, ``velocity_divergence``, ``vorticity``."""
+
+    def state(self) -> dict[str, Any]:
+        """All that is needed to go on from here to the last bit."""
+
+    def sample(self, points: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Fluid ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d), linear moving least squares; NaN without neighbours."""
+
+    def inflow_position(self) -> NDArray[np.float64]:
+        """Return the positions (m, d) of the inlet buffer particles."""
+
+    def set_inflow(self, velocity: NDArray[np.float64]) -> None:
+        """Prescribe the velocity of the inlet buffer particles, (d,) or (m, d) in the order of `inflow_position`."""
+
+def time_step_limits(settings: str, velocity_max: float) -> dict[str, float]:
+    """Stable Δt: ``penalty``, ``viscous``, ``body_force`` (inf where it does not apply), and ``lambda_max`` (λ_max Δx²)."""
+
+def bytes_per_particle(settings: str) -> float:
+    """Estimate the engine's memory per particle, buffers and neighbour list included."""
