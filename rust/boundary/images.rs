@@ -1,0 +1,81 @@
+//! Images: copies of the particles near a slip wall (mirrored) or a periodic side (shifted).
+//!
+//! An image has position `sign * x + offset` and velocity `sign * u` of its source, and its scalars. Corners are images of
+//! images, so one direction after the other is enough.
+
+use crate::particles::{Particles, Vector};
+use crate::settings::{Boundary, Domain};
+
+#[derive(Debug, Default)]
+pub struct Images<const D: usize> {
+    source: Vec<u32>,
+    sign: Vec<Vector<D>>,
+    offset: Vec<Vector<D>>,
+}
+
+impl<const D: usize> Images<D> {
+    /// Append to `particles`, which hold no images, those of everything within `reach` of a slip wall or periodic side.
+    pub fn create(&mut self, particles: &mut Particles<D>, domain: &Domain, reach: f64) {
+        self.source.clear();
+        self.sign.clear();
+        self.offset.clear();
+        particles.real = particles.len();
+        for axis in 0..D {
+            let count = particles.len();
+            let (lower, upper) = (domain.lower[axis], domain.upper[axis]);
+            let [lower_kind, upper_kind] = domain.boundaries[axis];
+            for i in 0..count {
+                let x = particles.position[i][axis];
+                let sides = [(lower_kind, lower, x - lower, upper - lower), (upper_kind, upper, upper - x, lower - upper)];
+                for (kind, plane, distance, period) in sides {
+                    if !(0.0..reach).contains(&distance) {
+                        continue;
+                    }
+                    match kind {
+                        Boundary::Periodic => self.push(particles, i, axis, 1.0, period),
+                        // A particle on the wall is its own image.
+                        Boundary::Slip if distance > 0.0 => self.push(particles, i, axis, -1.0, 2.0 * plane),
+                        _ => {}
+                    }
+                }
+            }
+        }
+    }
+
+    fn push(&mut self, particles: &mut Particles<D>, i: usize, axis: usize, factor: f64, shift: f64) {
+        let (mut source, mut sign, mut offset) = (i as u32, Vector::repeat(1.0), Vector::zeros());
+        if let Some(k) = i.checked_sub(particles.real) {
+            (source, sign, offset) = (self.source[k], self.sign[k], self.offset[k]);
+        }
+        sign[axis] *= factor;
+        offset[axis] = factor * offset[axis] + shift;
+        let image = particles.push_copy(source as usize);
+        particles.position[image] = sign.component_mul(&particles.position[source as usize]) + offset;
+        particles.velocity[image].component_mul_assign(&sign);
+        particles.normal[image].component_mul_assign(&sign);
+        self.source.push(source);
+        self.sign.push(sign);
+        self.offset.push(offset);
+    }
+
+    /// Renew the entries of the images from those of the real particles in front of them.
+    fn renew<T: Copy>(&self, field: &mut [T], image: impl Fn(usize, T) -> T) {
+        let (real, images) = field.split_at_mut(field.len() - self.source.len());
+        for (k, value) in images.iter_mut().enumerate() {
+            *value = image(k, real[self.source[k] as usize]);
+        }
+    }
+
+    pub fn positions(&self, field: &mut [Vector<D>]) {
+        self.renew(field, |k, x| self.sign[k].component_mul(&x) + self.offset[k]);
+    }
+
+    pub fn vectors(&self, field: &mut [Vector<D>]) {
+        self.renew(field, |k, u| self.sign[k].component_mul(&u));
+    }
+
+    /// Any field that an image shares with its source.
+    pub fn scalars<T: Copy>(&self, field: &mut [T]) {
+        self.renew(field, |_, value| value);
+    }
+}

@@ -1,0 +1,77 @@
+//! Solid walls: what velocity and pressure a solid particle shows to the fluid. (20)
+
+use crate::kernel::{Kernel, Smoothing};
+use crate::neighbours::Row;
+use crate::particles::{Particles, Vector};
+use crate::settings::{Settings, WallVelocity};
+use crate::with_kernel;
+
+/// Largest ratio of the distances of solid and fluid from the surface: β_max − 1 of Morris, Fox and Zhu (1997).
+const LARGEST_DISTANCE_RATIO: f64 = 0.5;
+
+/// The wall rules of a simulation.
+#[derive(Debug)]
+pub struct Walls<const D: usize> {
+    rule: WallVelocity,
+    body_velocity: Vec<Vector<D>>,
+    /// Velocity that solid particles show to the viscous term, real particles and images (not used by the pairwise rule).
+    pub viscous_velocity: Vec<Vector<D>>,
+}
+
+impl<const D: usize> Walls<D> {
+    pub fn new(settings: &Settings) -> Self {
+        let body_velocity = settings.bodies.iter().map(|body| Vector::from_column_slice(&body.velocity)).collect();
+        Self { rule: settings.wall_velocity, body_velocity, viscous_velocity: Vec::new() }
+    }
+
+    /// Velocity of the wall at solid particle `i`.
+    pub fn velocity(&self, particles: &Particles<D>, i: usize) -> Vector<D> {
+        self.body_velocity[particles.body[i] as usize]
+    }
+
+    /// Velocity of solid particle `s` in the viscous term of fluid particle `i`.
+    #[inline(always)]
+    pub fn seen_by(&self, particles: &Particles<D>, s: usize, i: usize) -> Vector<D> {
+        match self.rule {
+            WallVelocity::Paper => particles.velocity[s],
+            WallVelocity::Adami => self.viscous_velocity[s],
+            WallVelocity::Morris => {
+                let depth = particles.depth[s];
+                let height = (particles.position[i] - particles.position[s]).dot(&particles.normal[s]) - depth;
+                let ratio = (depth / height.max(f64::MIN_POSITIVE)).min(LARGEST_DISTANCE_RATIO);
+                particles.velocity[s] - (particles.velocity[i] - particles.velocity[s]) * ratio
+            }
+        }
+    }
+}
+
+/// Σ W field_j / Σ W over the flowing neighbours of `i`, of the value that `at` gives with r_ij. None without neighbours.
+pub fn shepard<const D: usize, const N: usize>(
+    settings: &Settings,
+    position: &[Vector<D>],
+    row: Row<D>,
+    i: usize,
+    at: impl Fn(usize, Vector<D>) -> [f64; N],
+) -> Option<[f64; N]> {
+    fn average<K: Kernel, const D: usize, const N: usize>(
+        kernel: Smoothing<K>,
+        position: &[Vector<D>],
+        row: Row<D>,
+        i: usize,
+        at: impl Fn(usize, Vector<D>) -> [f64; N],
+    ) -> Option<[f64; N]> {
+        let mut total = 0.0;
+        let mut sum = [0.0; N];
+        for pair in row.flowing() {
+            let r_ij = position[i] - position[pair.j()];
+            let weight = kernel.value(r_ij.norm());
+            let value = at(pair.j(), r_ij);
+            total += weight;
+            for k in 0..N {
+                sum[k] += weight * value[k];
+            }
+        }
+        (total > 0.0).then(|| sum.map(|s| s / total))
+    }
+    with_kernel!(settings.kernel, K => average(Smoothing::<K>::new(settings.smoothing_length(), D), position, row, i, at))
+}

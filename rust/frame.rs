@@ -1,0 +1,59 @@
+//! A frame: the particle positions at which derivatives are taken, with their images, neighbours and stencil.
+
+use crate::boundary::Images;
+use crate::neighbours::Grid;
+use crate::particles::{Particles, Vector};
+use crate::settings::Settings;
+use crate::stencil::Stencil;
+
+#[derive(Debug, Default)]
+pub struct Frame<const D: usize> {
+    pub images: Images<D>,
+    pub grid: Grid<D>,
+    pub stencil: Stencil<D>,
+    /// Positions that the neighbour list was made at, and how much two particles may approach before it must be renewed.
+    searched: Vec<Vector<D>>,
+    skin: f64,
+}
+
+impl<const D: usize> Frame<D> {
+    /// Put the particles into cell order, create their images, search neighbours and evaluate the stencil. The list stays
+    /// complete until two particles have approached each other by `skin`.
+    pub fn search(&mut self, settings: &Settings, particles: &mut Particles<D>, skin: f64) {
+        let radius = settings.support_radius() + skin;
+        self.skin = skin;
+        particles.drop_images();
+        self.grid.build(&particles.position, radius);
+        particles.reorder(self.grid.order());
+        // Twice the skin, so that a list renewed within the step finds its images too.
+        self.images.create(particles, &settings.domain, radius + skin);
+        self.list_neighbours(settings, particles);
+        self.evaluate(settings, particles);
+    }
+
+    /// Evaluate the stencil again after particles (and images) have moved within the step.
+    pub fn update(&mut self, settings: &Settings, particles: &Particles<D>) {
+        if settings.search_every_iteration || self.is_stale(particles) {
+            self.list_neighbours(settings, particles);
+        }
+        self.evaluate(settings, particles);
+    }
+
+    fn list_neighbours(&mut self, settings: &Settings, particles: &Particles<D>) {
+        let radius = settings.support_radius() + self.skin;
+        self.grid.build(&particles.position, radius);
+        self.stencil.neighbours.search(particles, &self.grid, radius);
+        self.searched.clear();
+        self.searched.extend_from_slice(&particles.position[..particles.real]);
+    }
+
+    fn is_stale(&self, particles: &Particles<D>) -> bool {
+        let limit = (0.5 * self.skin).powi(2);
+        self.searched.iter().zip(&particles.position).any(|(old, new)| (new - old).norm_squared() > limit)
+    }
+
+    fn evaluate(&mut self, settings: &Settings, particles: &Particles<D>) {
+        let images = &self.images;
+        self.stencil.evaluate(settings, particles, |volume| images.scalars(volume));
+    }
+}

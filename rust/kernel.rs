@@ -1,0 +1,189 @@
+//! Smoothing kernels W(r, h), normalised in 1-D to 3-D.
+
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// A radial kernel W = σ_D / h^D · w(q), q = r/h. Implementations give w and dw/dq without the factor.
+pub trait Kernel: Copy + Send + Sync {
+    /// Support radius over smoothing length: w(q) = 0 for q at or above it.
+    const SUPPORT: f64;
+    /// σ_D, so that the integral over D-dimensional space is 1.
+    fn factor(dimensions: usize) -> f64;
+    fn value(q: f64) -> f64;
+    fn derivative(q: f64) -> f64;
+}
+
+/// Quintic spline, support 3h (Liu and Liu 2010, the paper's reference 38).
+#[derive(Clone, Copy)]
+pub struct QuinticSpline;
+
+impl Kernel for QuinticSpline {
+    const SUPPORT: f64 = 3.0;
+
+    fn factor(dimensions: usize) -> f64 {
+        [1.0 / 120.0, 7.0 / (478.0 * PI), 1.0 / (120.0 * PI)][dimensions - 1]
+    }
+
+    #[inline(always)]
+    fn value(q: f64) -> f64 {
+        let [a, b, c] = [3.0 - q, 2.0 - q, 1.0 - q].map(|t| t.max(0.0));
+        a * (a * a) * (a * a) - 6.0 * b * (b * b) * (b * b) + 15.0 * c * (c * c) * (c * c)
+    }
+
+    #[inline(always)]
+    fn derivative(q: f64) -> f64 {
+        let [a, b, c] = [3.0 - q, 2.0 - q, 1.0 - q].map(|t| t.max(0.0));
+        let (a2, b2, c2) = (a * a, b * b, c * c);
+        -5.0 * (a2 * a2 - 6.0 * b2 * b2 + 15.0 * c2 * c2)
+    }
+}
+
+/// Wendland C2 in its 2-D and 3-D form, support 2h (Wendland 1995; Dehnen and Aly 2012).
+#[derive(Clone, Copy)]
+pub struct WendlandC2;
+
+impl Kernel for WendlandC2 {
+    const SUPPORT: f64 = 2.0;
+
+    fn factor(dimensions: usize) -> f64 {
+        [3.0 / 4.0, 7.0 / (4.0 * PI), 21.0 / (16.0 * PI)][dimensions - 1]
+    }
+
+    #[inline(always)]
+    fn value(q: f64) -> f64 {
+        let a = (1.0 - 0.5 * q).max(0.0);
+        a * a * a * a * (2.0 * q + 1.0)
+    }
+
+    #[inline(always)]
+    fn derivative(q: f64) -> f64 {
+        let a = (1.0 - 0.5 * q).max(0.0);
+        -5.0 * q * a * a * a
+    }
+}
+
+/// Wendland C4 in its 2-D and 3-D form, support 2h (Wendland 1995; Dehnen and Aly 2012).
+#[derive(Clone, Copy)]
+pub struct WendlandC4;
+
+impl Kernel for WendlandC4 {
+    const SUPPORT: f64 = 2.0;
+
+    fn factor(dimensions: usize) -> f64 {
+        [27.0 / 32.0, 9.0 / (4.0 * PI), 495.0 / (256.0 * PI)][dimensions - 1]
+    }
+
+    #[inline(always)]
+    fn value(q: f64) -> f64 {
+        let a = (1.0 - 0.5 * q).max(0.0);
+        a * (a * a) * (a * a) * a * (35.0 / 12.0 * q * q + 3.0 * q + 1.0)
+    }
+
+    #[inline(always)]
+    fn derivative(q: f64) -> f64 {
+        let a = (1.0 - 0.5 * q).max(0.0);
+        -q * a * (a * a) * (a * a) * (14.0 / 3.0) * (1.0 + 2.5 * q)
+    }
+}
+
+/// The choice of kernel as a setting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum KernelKind {
+    QuinticSpline,
+    WendlandC2,
+    WendlandC4,
+}
+
+/// Run `$body` with the type `$K` bound to the kernel chosen at run time.
+#[macro_export]
+macro_rules! with_kernel {
+    ($kind:expr, $K:ident => $body:expr) => {
+        match $kind {
+            $crate::kernel::KernelKind::QuinticSpline => {
+                type $K = $crate::kernel::QuinticSpline;
+                $body
+            }
+            $crate::kernel::KernelKind::WendlandC2 => {
+                type $K = $crate::kernel::WendlandC2;
+                $body
+            }
+            $crate::kernel::KernelKind::WendlandC4 => {
+                type $K = $crate::kernel::WendlandC4;
+                $body
+            }
+        }
+    };
+}
+
+impl KernelKind {
+    /// Support radius over smoothing length.
+    pub fn support(self) -> f64 {
+        with_kernel!(self, K => K::SUPPORT)
+    }
+}
+
+/// A kernel with its smoothing length and dimension fixed.
+#[derive(Clone, Copy)]
+pub struct Smoothing<K> {
+    inverse_length: f64,
+    factor: f64,
+    kernel: std::marker::PhantomData<K>,
+}
+
+impl<K: Kernel> Smoothing<K> {
+    pub fn new(smoothing_length: f64, dimensions: usize) -> Self {
+        let factor = K::factor(dimensions) / smoothing_length.powi(dimensions as i32);
+        Self { inverse_length: 1.0 / smoothing_length, factor, kernel: std::marker::PhantomData }
+    }
+
+    /// W(r).
+    #[inline(always)]
+    pub fn value(&self, distance: f64) -> f64 {
+        self.factor * K::value(distance * self.inverse_length)
+    }
+
+    /// (dW/dr) / r, so that ∇_i W_ij = gradient_over_distance · r_ij. `distance` must not be zero.
+    #[inline(always)]
+    pub fn gradient_over_distance(&self, distance: f64) -> f64 {
+        self.factor * self.inverse_length * K::derivative(distance * self.inverse_length) / distance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn check<K: Kernel>(first_dimension: usize) {
+        for dimensions in first_dimension..=3 {
+            let h = 0.7;
+            let smoothing = Smoothing::<K>::new(h, dimensions);
+            let steps = 20_000;
+            let dr = K::SUPPORT * h / steps as f64;
+            let integral: f64 = (0..steps)
+                .map(|k| {
+                    let r = (k as f64 + 0.5) * dr;
+                    let shell = [2.0, 2.0 * PI * r, 4.0 * PI * r * r][dimensions - 1];
+                    smoothing.value(r) * shell * dr
+                })
+                .sum();
+            assert_relative_eq!(integral, 1.0, epsilon = 1e-6);
+        }
+        for k in 1..100 {
+            let q = K::SUPPORT * k as f64 / 100.0;
+            let difference = (K::value(q + 1e-6) - K::value(q - 1e-6)) / 2e-6;
+            assert_relative_eq!(K::derivative(q), difference, epsilon = 1e-7, max_relative = 1e-6);
+            assert!(K::derivative(q) <= 0.0);
+        }
+        assert_eq!(K::value(K::SUPPORT), 0.0);
+        assert_eq!(K::derivative(K::SUPPORT * 1.5), 0.0);
+    }
+
+    #[test]
+    fn kernels_integrate_to_one_and_match_their_derivative() {
+        check::<QuinticSpline>(1);
+        check::<WendlandC2>(2);
+        check::<WendlandC4>(2);
+    }
+}

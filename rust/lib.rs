@@ -1,0 +1,30 @@
+//! alsph: Augmented Lagrangian SPH for incompressible flow.
+//!
+//! The engine behind the Python package of the same name. A [`Simulation`] holds the particles and settings; a time step is
+//! `Simulation::step`, and the method's equations (8) to (13) are [`scheme::Alsph::iterate`]. Equation numbers are those of
+//! Kolukisa, Ozbulut and Yildiz, Symmetry 2021, 13, 472.
+
+pub mod boundary;
+pub mod error;
+pub mod frame;
+mod interpolation;
+pub mod kernel;
+pub mod loads;
+pub mod neighbours;
+pub mod operators;
+pub mod parallel;
+pub mod particles;
+#[cfg(feature = "python")]
+mod python;
+pub mod report;
+pub mod scheme;
+pub mod settings;
+mod shifting;
+mod simulation;
+pub mod stencil;
+
+pub use error::{Error, Result};
+pub use particles::{Matrix, ParticleKind, Particles, Vector};
+pub use report::Report;
+pub use settings::Settings;
+pub use simulation::{Clock, Simulation, Snapshot};

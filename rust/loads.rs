@@ -1,0 +1,102 @@
+//! Force and torque of the fluid on each body.
+//!
+//! The pressure acts through Σ_s Σ_f V_s V_f (p_s + p_f) ∇_s W_sf over solid s and fluid f, the viscous stress through the
+//! compact Laplacian of the same pairs. Both are antisymmetric, so the solid's own pairs cancel and only fluid neighbours count.
+
+use crate::boundary::Walls;
+use crate::frame::Frame;
+use crate::parallel;
+use crate::particles::{ParticleKind, Particles, Vector};
+use crate::settings::Settings;
+
+/// Force and torque on one body. In 2-D the torque's only component is the last one.
+#[derive(Clone, Copy, Debug)]
+pub struct Load<const D: usize> {
+    pub pressure_force: Vector<D>,
+    pub viscous_force: Vector<D>,
+    pub pressure_torque: [f64; 3],
+    pub viscous_torque: [f64; 3],
+}
+
+impl<const D: usize> Default for Load<D> {
+    fn default() -> Self {
+        Self {
+            pressure_force: Vector::zeros(),
+            viscous_force: Vector::zeros(),
+            pressure_torque: [0.0; 3],
+            viscous_torque: [0.0; 3],
+        }
+    }
+}
+
+impl<const D: usize> Load<D> {
+    fn add(&mut self, arm: &Vector<D>, pressure: Vector<D>, viscous: Vector<D>) {
+        self.pressure_force += pressure;
+        self.viscous_force += viscous;
+        add(&mut self.pressure_torque, cross(arm, &pressure));
+        add(&mut self.viscous_torque, cross(arm, &viscous));
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.pressure_force += other.pressure_force;
+        self.viscous_force += other.viscous_force;
+        add(&mut self.pressure_torque, other.pressure_torque);
+        add(&mut self.viscous_torque, other.viscous_torque);
+    }
+}
+
+/// The loads on every body, at the positions of `frame`.
+pub fn loads<const D: usize>(
+    settings: &Settings,
+    particles: &Particles<D>,
+    frame: &Frame<D>,
+    walls: &Walls<D>,
+) -> Vec<Load<D>> {
+    let centers: Vec<_> = settings.bodies.iter().map(|body| Vector::<D>::from_column_slice(&body.center)).collect();
+    let chunk = |range: std::ops::Range<usize>| {
+        let mut loads = vec![Load::default(); centers.len()];
+        for s in range.filter(|&i| particles.kind[i] == ParticleKind::Solid) {
+            let (pressure, viscous) = force_on(settings, particles, frame, walls, s);
+            let body = particles.body[s] as usize;
+            loads[body].add(&(particles.position[s] - centers[body]), pressure, viscous);
+        }
+        loads
+    };
+    parallel::reduce(particles.real, chunk, |mut sum, part| {
+        sum.iter_mut().zip(&part).for_each(|(sum, part)| sum.merge(part));
+        sum
+    })
+    .unwrap_or_default()
+}
+
+/// Pressure and viscous force on solid particle `s`.
+fn force_on<const D: usize>(
+    settings: &Settings,
+    particles: &Particles<D>,
+    frame: &Frame<D>,
+    walls: &Walls<D>,
+    s: usize,
+) -> (Vector<D>, Vector<D>) {
+    let stencil = &frame.stencil;
+    let viscosity = settings.density * settings.kinematic_viscosity;
+    let (mut pressure, mut viscous) = (Vector::zeros(), Vector::zeros());
+    for pair in stencil.neighbours.row(s).flowing() {
+        let f = pair.j();
+        // V_f times the kernel's slope over distance, which is negative.
+        let slope = -f64::from(pair.laplacian) / stencil.laplacian_factor[s];
+        let r_sf = particles.position[s] - particles.position[f];
+        pressure -= r_sf * (slope * (particles.pressure[s] + particles.pressure[f]));
+        let seen = walls.seen_by(particles, s, f);
+        viscous += (particles.velocity[f] - seen) * (-slope * 2.0 * viscosity);
+    }
+    (pressure * stencil.volume[s], viscous * stencil.volume[s])
+}
+
+fn add(sum: &mut [f64; 3], part: [f64; 3]) {
+    sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
+}
+
+fn cross<const D: usize>(a: &Vector<D>, b: &Vector<D>) -> [f64; 3] {
+    let [a, b] = [a, b].map(|v| nalgebra::Vector3::from_fn(|k, _| if k < D { v[k] } else { 0.0 }));
+    a.cross(&b).into()
+}

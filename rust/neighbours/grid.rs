@@ -1,0 +1,114 @@
+//! Cells at least as wide as the search radius; points are listed by cell with a counting sort.
+
+use crate::particles::Vector;
+use std::ops::Range;
+
+/// Cells a point, above which the cells are made wider (a few stray particles must not cost memory).
+const CELLS_PER_POINT: usize = 8;
+
+#[derive(Debug)]
+pub struct Grid<const D: usize> {
+    origin: Vector<D>,
+    inverse_width: f64,
+    cells: [usize; D],
+    /// First entry of `items` of each cell, and the end.
+    starts: Vec<u32>,
+    /// Point indices sorted by cell (first direction fastest), then by index.
+    items: Vec<u32>,
+    cell_of: Vec<u32>,
+}
+
+impl<const D: usize> Default for Grid<D> {
+    fn default() -> Self {
+        Self {
+            origin: Vector::zeros(),
+            inverse_width: 1.0,
+            cells: [1; D],
+            starts: vec![0, 0],
+            items: Vec::new(),
+            cell_of: Vec::new(),
+        }
+    }
+}
+
+impl<const D: usize> Grid<D> {
+    /// Sort `points`, which must be finite, for searches within `radius`.
+    pub fn build(&mut self, points: &[Vector<D>], radius: f64) {
+        let Some(&first) = points.first() else {
+            *self = Self::default();
+            return;
+        };
+        let (lower, upper) = points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
+        self.origin = lower;
+        // A hair wider than the radius, so that rounding cannot put a neighbour two cells away.
+        let mut width = radius * (1.0 + 1e-9);
+        loop {
+            let counts = (upper - lower).map(|extent| (extent / width).floor() + 1.0);
+            if counts.iter().product::<f64>() <= (CELLS_PER_POINT * points.len()).max(64) as f64 {
+                self.cells = std::array::from_fn(|axis| counts[axis] as usize);
+                break;
+            }
+            width *= 2.0;
+        }
+        self.inverse_width = 1.0 / width;
+        self.counting_sort(points);
+    }
+
+    fn counting_sort(&mut self, points: &[Vector<D>]) {
+        self.starts.clear();
+        self.starts.resize(self.cells.iter().product::<usize>() + 1, 0);
+        self.cell_of.clear();
+        for point in points {
+            let cell = self.flat(self.cell(point));
+            self.cell_of.push(cell as u32);
+            self.starts[cell + 1] += 1;
+        }
+        for cell in 1..self.starts.len() {
+            self.starts[cell] += self.starts[cell - 1];
+        }
+        self.items.resize(points.len(), 0);
+        for (index, &cell) in self.cell_of.iter().enumerate() {
+            let slot = &mut self.starts[cell as usize];
+            self.items[*slot as usize] = index as u32;
+            *slot += 1;
+        }
+        // Each start has moved on to its end, which is the next cell's start.
+        self.starts.rotate_right(1);
+        self.starts[0] = 0;
+    }
+
+    /// Point indices sorted by cell, then by index.
+    pub fn order(&self) -> &[u32] {
+        &self.items
+    }
+
+    /// Call `visit` with each run of point indices that may lie within the search radius of `point`, in a fixed order.
+    #[inline]
+    pub fn for_each_run(&self, point: &Vector<D>, mut visit: impl FnMut(&[u32])) {
+        let center = self.cell(point);
+        let range = |axis: usize| center[axis].saturating_sub(1)..(center[axis] + 2).min(self.cells[axis]);
+        let first = range(0);
+        let mut visit_row = |row: usize| visit(&self.items[self.run(row * self.cells[0], &first)]);
+        match D {
+            2 => range(1).for_each(&mut visit_row),
+            _ => range(2).for_each(|k| range(1).for_each(|j| visit_row(k * self.cells[1] + j))),
+        }
+    }
+
+    fn run(&self, row_start: usize, cells: &Range<usize>) -> Range<usize> {
+        self.starts[row_start + cells.start] as usize..self.starts[row_start + cells.end] as usize
+    }
+
+    #[inline]
+    fn cell(&self, point: &Vector<D>) -> [usize; D] {
+        // A float-to-integer cast saturates, so points outside the box land in its border cells.
+        std::array::from_fn(|axis| {
+            (((point[axis] - self.origin[axis]) * self.inverse_width) as usize).min(self.cells[axis] - 1)
+        })
+    }
+
+    #[inline]
+    fn flat(&self, cell: [usize; D]) -> usize {
+        cell.iter().zip(&self.cells).rev().fold(0, |flat, (&c, &n)| flat * n + c)
+    }
+}

@@ -1,0 +1,160 @@
+//! The flat neighbour list: one row of pairs a real particle, stored chunk by chunk.
+
+use super::Grid;
+use crate::parallel::CHUNK;
+use crate::particles::{ParticleKind, Particles};
+use rayon::prelude::*;
+
+/// Type of the stored pair weights.
+#[cfg(not(feature = "double-weights"))]
+pub type Weight = f32;
+#[cfg(feature = "double-weights")]
+pub type Weight = f64;
+
+/// A neighbour and the weights with which its differences enter the derivatives at the row's particle.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Pair<const D: usize> {
+    /// ∇f_i = Σ gradient (f_j − f_i): the corrected V_j ∇_i W_ij.
+    pub gradient: [Weight; D],
+    /// ∇²f_i = Σ laplacian (f_j − f_i).
+    pub laplacian: Weight,
+    /// j.
+    pub index: u32,
+}
+
+impl<const D: usize> Pair<D> {
+    #[inline(always)]
+    pub fn j(&self) -> usize {
+        self.index as usize
+    }
+}
+
+/// The neighbours of one particle: those that flow, then the solid ones.
+#[derive(Clone, Copy)]
+pub struct Row<'a, const D: usize> {
+    pairs: &'a [Pair<D>],
+    flowing: usize,
+}
+
+impl<'a, const D: usize> Row<'a, D> {
+    #[inline(always)]
+    pub fn all(&self) -> &'a [Pair<D>] {
+        self.pairs
+    }
+
+    /// Fluid and buffer neighbours.
+    #[inline(always)]
+    pub fn flowing(&self) -> &'a [Pair<D>] {
+        &self.pairs[..self.flowing]
+    }
+
+    #[inline(always)]
+    pub fn solid(&self) -> &'a [Pair<D>] {
+        &self.pairs[self.flowing..]
+    }
+}
+
+#[derive(Debug, Default)]
+struct Chunk<const D: usize> {
+    pairs: Vec<Pair<D>>,
+    /// Start of each row and of its solid part, and the end.
+    starts: Vec<[u32; 2]>,
+    solid: Vec<u32>,
+}
+
+impl<const D: usize> Chunk<D> {
+    #[inline(always)]
+    fn row(&self, k: usize) -> Row<'_, D> {
+        let [start, solid] = self.starts[k];
+        Row { pairs: &self.pairs[start as usize..self.starts[k + 1][0] as usize], flowing: (solid - start) as usize }
+    }
+
+    fn search(&mut self, rows: std::ops::Range<usize>, particles: &Particles<D>, grid: &Grid<D>, radius: f64) {
+        let blank = |index| Pair { gradient: [0.0; D], laplacian: 0.0, index };
+        let square = radius * radius;
+        self.pairs.clear();
+        self.starts.clear();
+        for i in rows {
+            let start = self.pairs.len() as u32;
+            let point = particles.position[i];
+            grid.for_each_run(&point, |run| {
+                for &j in run {
+                    if (particles.position[j as usize] - point).norm_squared() < square && j as usize != i {
+                        match particles.kind[j as usize] {
+                            ParticleKind::Solid => self.solid.push(j),
+                            _ => self.pairs.push(blank(j)),
+                        }
+                    }
+                }
+            });
+            self.starts.push([start, self.pairs.len() as u32]);
+            self.pairs.extend(self.solid.drain(..).map(blank));
+        }
+        self.starts.push([self.pairs.len() as u32; 2]);
+    }
+}
+
+#[derive(Debug, Default)]
+pub struct NeighbourList<const D: usize> {
+    chunks: Vec<Chunk<D>>,
+}
+
+impl<const D: usize> NeighbourList<D> {
+    /// List the neighbours within `radius` of every real particle. The weights are left blank.
+    pub fn search(&mut self, particles: &Particles<D>, grid: &Grid<D>, radius: f64) {
+        let rows = particles.real;
+        self.chunks.resize_with(rows.div_ceil(CHUNK), Chunk::default);
+        self.chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
+            chunk.search(c * CHUNK..((c + 1) * CHUNK).min(rows), particles, grid, radius);
+        });
+    }
+
+    /// `f(i, row, &mut a[i], &mut b[i])` for every row, in parallel.
+    pub fn for_each<A: Send, B: Send>(
+        &self,
+        a: &mut [A],
+        b: &mut [B],
+        f: impl Fn(usize, Row<D>, &mut A, &mut B) + Sync + Send,
+    ) {
+        let outputs = a.par_chunks_mut(CHUNK).zip(b.par_chunks_mut(CHUNK));
+        self.chunks.par_iter().zip(outputs).enumerate().for_each(|(c, (chunk, (a, b)))| {
+            for (k, (a, b)) in a.iter_mut().zip(b).enumerate() {
+                f(c * CHUNK + k, chunk.row(k), a, b);
+            }
+        });
+    }
+
+    /// `f(i, row, &mut out[i])` for every row, in parallel.
+    pub fn for_each_one<A: Send>(&self, out: &mut [A], f: impl Fn(usize, Row<D>, &mut A) + Sync + Send) {
+        // A vector of () takes no memory.
+        let mut nothing = vec![(); out.len()];
+        self.for_each(out, &mut nothing, |i, row, out, ()| f(i, row, out));
+    }
+
+    /// Fill the pairs of every row in parallel.
+    pub fn for_each_mut<A: Send, B: Send>(
+        &mut self,
+        a: &mut [A],
+        b: &mut [B],
+        f: impl Fn(usize, &mut [Pair<D>], &mut A, &mut B) + Sync + Send,
+    ) {
+        let outputs = a.par_chunks_mut(CHUNK).zip(b.par_chunks_mut(CHUNK));
+        self.chunks.par_iter_mut().zip(outputs).enumerate().for_each(|(c, (chunk, (a, b)))| {
+            for (k, (a, b)) in a.iter_mut().zip(b).enumerate() {
+                let range = chunk.starts[k][0] as usize..chunk.starts[k + 1][0] as usize;
+                f(c * CHUNK + k, &mut chunk.pairs[range], a, b);
+            }
+        });
+    }
+
+    /// The row of particle `i`.
+    pub fn row(&self, i: usize) -> Row<'_, D> {
+        self.chunks[i / CHUNK].row(i % CHUNK)
+    }
+
+    /// Directed pairs in the list.
+    pub fn pair_count(&self) -> usize {
+        self.chunks.iter().map(|chunk| chunk.pairs.len()).sum()
+    }
+}

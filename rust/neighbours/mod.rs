@@ -1,0 +1,9 @@
+//! Neighbour search: a counting-sort cell grid and a flat list of rows.
+
+mod brute_force;
+mod grid;
+mod list;
+
+pub use brute_force::brute_force_neighbours;
+pub use grid::Grid;
+pub use list::{NeighbourList, Pair, Row, Weight};

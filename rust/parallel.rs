@@ -1,0 +1,26 @@
+//! Fixed chunks of particles: the unit of parallel work, and of sums that do not depend on the number of threads.
+
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Particles a task. Fixed, because sums are formed chunk by chunk.
+pub const CHUNK: usize = 256;
+
+/// Map each chunk of `0..count` in parallel, then fold the results in order.
+pub fn reduce<R: Send>(count: usize, map: impl Fn(Range<usize>) -> R + Sync + Send, fold: impl Fn(R, R) -> R) -> Option<R> {
+    (0..count.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| map(chunk * CHUNK..((chunk + 1) * CHUNK).min(count)))
+        .collect::<Vec<R>>()
+        .into_iter()
+        .reduce(fold)
+}
+
+/// `f(i, &mut out[i])` for every entry, in parallel.
+pub fn for_each<T: Send>(out: &mut [T], f: impl Fn(usize, &mut T) + Sync + Send) {
+    out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
+        for (k, value) in out.iter_mut().enumerate() {
+            f(chunk * CHUNK + k, value);
+        }
+    });
+}

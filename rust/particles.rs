@@ -1,0 +1,139 @@
+//! The particles: structure of arrays, real particles first, their images after them.
+
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+pub type Vector<const D: usize> = nalgebra::SVector<f64, D>;
+pub type Matrix<const D: usize> = nalgebra::SMatrix<f64, D, D>;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
+pub enum ParticleKind {
+    /// Moved and solved for.
+    Fluid = 0,
+    /// Upstream buffer: moves with its prescribed velocity.
+    Inlet = 1,
+    /// Downstream buffer: keeps the velocity it left the domain with.
+    Outlet = 2,
+    /// Part of a body or wall.
+    Solid = 3,
+}
+
+impl TryFrom<u8> for ParticleKind {
+    type Error = Error;
+
+    fn try_from(value: u8) -> Result<Self> {
+        match value {
+            0 => Ok(Self::Fluid),
+            1 => Ok(Self::Inlet),
+            2 => Ok(Self::Outlet),
+            3 => Ok(Self::Solid),
+            _ => {
+                Err(Error::Array { name: "kind", problem: format!("{value} is not 0 fluid, 1 inlet, 2 outlet or 3 solid") })
+            }
+        }
+    }
+}
+
+/// Arrays of one length. The first `real` entries are particles, the rest their images across walls and periodic sides.
+#[derive(Clone, Debug, Default)]
+pub struct Particles<const D: usize> {
+    pub real: usize,
+    pub position: Vec<Vector<D>>,
+    pub velocity: Vec<Vector<D>>,
+    pub pressure: Vec<f64>,
+    pub kind: Vec<ParticleKind>,
+    /// Index into the bodies; 0 for particles that are not solid.
+    pub body: Vec<u16>,
+    /// Outward unit normal of the body at a solid particle; zero elsewhere.
+    pub normal: Vec<Vector<D>>,
+    /// Distance of a solid particle below the surface of its body.
+    pub depth: Vec<f64>,
+    pub id: Vec<u64>,
+}
+
+/// Apply `$f` to every array of the particles.
+macro_rules! each_array {
+    ($self:ident, $array:ident => $f:expr) => {{
+        {
+            let $array = &mut $self.position;
+            $f;
+        }
+        {
+            let $array = &mut $self.velocity;
+            $f;
+        }
+        {
+            let $array = &mut $self.pressure;
+            $f;
+        }
+        {
+            let $array = &mut $self.kind;
+            $f;
+        }
+        {
+            let $array = &mut $self.body;
+            $f;
+        }
+        {
+            let $array = &mut $self.normal;
+            $f;
+        }
+        {
+            let $array = &mut $self.depth;
+            $f;
+        }
+        {
+            let $array = &mut $self.id;
+            $f;
+        }
+    }};
+}
+
+impl<const D: usize> Particles<D> {
+    /// Number of real particles and images.
+    pub fn len(&self) -> usize {
+        self.position.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.position.is_empty()
+    }
+
+    pub fn drop_images(&mut self) {
+        let real = self.real;
+        each_array!(self, array => array.truncate(real));
+    }
+
+    /// Put the real particles into the order `order[new] = old`. Images must have been dropped.
+    pub fn reorder(&mut self, order: &[u32]) {
+        if order.iter().enumerate().all(|(new, &old)| new == old as usize) {
+            return;
+        }
+        each_array!(self, array => *array = order.iter().map(|&old| array[old as usize]).collect());
+    }
+
+    /// Keep the real particles for which `keep` holds, in order. Images must have been dropped.
+    pub fn retain(&mut self, keep: &[bool]) {
+        each_array!(self, array => {
+            let mut flags = keep.iter();
+            array.retain(|_| *flags.next().unwrap_or(&true));
+        });
+        self.real = self.position.len();
+    }
+
+    /// Append a copy of particle `source`; the caller changes what differs. Returns its index.
+    pub fn push_copy(&mut self, source: usize) -> usize {
+        each_array!(self, array => array.push(array[source]));
+        self.len() - 1
+    }
+
+    /// Number of real particles of each kind: fluid, inlet, outlet, solid.
+    pub fn counts(&self) -> [usize; 4] {
+        let mut counts = [0; 4];
+        for kind in &self.kind[..self.real] {
+            counts[*kind as usize] += 1;
+        }
+        counts
+    }
+}

@@ -1,0 +1,387 @@
+//! The extension module `alsph._alsph`: the only file that knows Python.
+
+use crate::neighbours::Pair;
+use crate::particles::Matrix;
+use crate::{Clock, Error, ParticleKind, Particles, Report, Settings, Simulation, Vector};
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::create_exception;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::time::Duration;
+
+create_exception!(
+    _alsph,
+    SolverError,
+    PyRuntimeError,
+    "The computation broke down; args[0] names step, time, particle, position and field."
+);
+create_exception!(
+    _alsph,
+    ConfigError,
+    PyValueError,
+    "The settings or the arrays cannot be used; args[0] says what, where and how to mend it."
+);
+
+impl From<Error> for PyErr {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Diverged { .. } => SolverError::new_err(error.to_string()),
+            Error::Setting { .. } | Error::Array { .. } => ConfigError::new_err(error.to_string()),
+        }
+    }
+}
+
+fn array_error(name: &'static str, problem: impl Into<String>) -> PyErr {
+    Error::Array { name, problem: problem.into() }.into()
+}
+
+/// The simulation in the dimension chosen at run time.
+enum Engine {
+    Two(Box<Simulation<2>>),
+    Three(Box<Simulation<3>>),
+}
+
+/// Run `$body` with `$simulation` bound to the simulation of either dimension.
+macro_rules! engine {
+    ($engine:expr, $simulation:ident => $body:expr) => {
+        match $engine {
+            Engine::Two($simulation) => $body,
+            Engine::Three($simulation) => $body,
+        }
+    };
+}
+
+/// State and stepping of one simulation in 2-D or 3-D.
+#[pyclass(name = "Simulation", module = "alsph._alsph")]
+struct PySimulation(Engine);
+
+#[pymethods]
+impl PySimulation {
+    #[new]
+    #[pyo3(signature = (settings, state, threads=None))]
+    fn new(settings: &str, state: &Bound<'_, PyDict>, threads: Option<usize>) -> PyResult<Self> {
+        let settings = Settings::from_json(settings)?;
+        if threads == Some(0) {
+            return Err(ConfigError::new_err("setting `threads`: must be at least 1"));
+        }
+        let clock = read_clock(state)?;
+        Ok(Self(match settings.dimensions {
+            2 => Engine::Two(Box::new(Simulation::new(settings, read_particles(state)?, clock, threads)?)),
+            _ => Engine::Three(Box::new(Simulation::new(settings, read_particles(state)?, clock, threads)?)),
+        }))
+    }
+
+    #[getter]
+    fn dimensions(&self) -> usize {
+        engine!(&self.0, s => s.settings().dimensions)
+    }
+
+    #[getter]
+    fn time(&self) -> f64 {
+        engine!(&self.0, s => s.clock().time)
+    }
+
+    #[getter]
+    fn step(&self) -> u64 {
+        engine!(&self.0, s => s.clock().step)
+    }
+
+    #[getter]
+    fn threads(&self) -> usize {
+        engine!(&self.0, s => s.threads())
+    }
+
+    /// Particles by kind: ``fluid``, ``inlet``, ``outlet``, ``solid``.
+    #[getter]
+    fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let counts = engine!(&self.0, s => s.particles().counts());
+        let dict = PyDict::new(py);
+        for (name, count) in KIND_NAMES.iter().zip(counts) {
+            dict.set_item(name, count)?;
+        }
+        Ok(dict)
+    }
+
+    /// Take up to `steps` steps, stop early after `wall_seconds`; return the steps taken.
+    #[pyo3(signature = (steps, wall_seconds=None))]
+    fn advance(&mut self, py: Python<'_>, steps: u64, wall_seconds: Option<f64>) -> PyResult<u64> {
+        let wall = wall(wall_seconds)?;
+        Ok(engine!(&mut self.0, s => py.detach(|| s.advance(steps, wall)))?)
+    }
+
+    /// Step until ``self.time >= time`` (True) or `wall_seconds` have passed (False). Δt is never clipped to `time`.
+    #[pyo3(signature = (time, wall_seconds=None))]
+    fn advance_until(&mut self, py: Python<'_>, time: f64, wall_seconds: Option<f64>) -> PyResult<bool> {
+        if time.is_nan() {
+            return Err(ConfigError::new_err("argument `time`: must be a number, not NaN"));
+        }
+        let wall = wall(wall_seconds)?;
+        Ok(engine!(&mut self.0, s => py.detach(|| s.advance_until(time, wall)))?)
+    }
+
+    /// One row for each step since the last call, see docs/architecture.md for the columns.
+    fn take_history<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        engine!(&mut self.0, s => {
+            let bodies = s.settings().bodies.len();
+            history(py, &s.take_history(), bodies)
+        })
+    }
+
+    /// Return the particles: the arrays of `state` and ``volume``, ``velocity_divergence``, ``vorticity``.
+    fn snapshot<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        match &mut self.0 {
+            Engine::Two(s) => {
+                let (dict, gradient) = snapshot(py, s)?;
+                let vorticity = gradient.iter().map(|g| g[(1, 0)] - g[(0, 1)]).collect::<Vec<_>>();
+                dict.set_item("vorticity", vorticity.into_pyarray(py))?;
+                Ok(dict)
+            }
+            Engine::Three(s) => {
+                let (dict, gradient) = snapshot(py, s)?;
+                let curl =
+                    |g: &Matrix<3>| Vector::from([g[(2, 1)] - g[(1, 2)], g[(0, 2)] - g[(2, 0)], g[(1, 0)] - g[(0, 1)]]);
+                dict.set_item("vorticity", vectors(py, gradient.iter().map(curl)))?;
+                Ok(dict)
+            }
+        }
+    }
+
+    /// All that is needed to go on from here to the last bit.
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        engine!(&self.0, s => state(py, s.particles(), s.clock()))
+    }
+
+    /// Fluid ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d), linear moving least squares; NaN without neighbours.
+    fn sample<'py>(&mut self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+        engine!(&mut self.0, s => {
+            let points = read_vectors("points", points)?;
+            let values = py.detach(|| s.sample(&points));
+            let dict = PyDict::new(py);
+            dict.set_item("pressure", values.iter().map(|v| v.0).collect::<Vec<_>>().into_pyarray(py))?;
+            dict.set_item("velocity", vectors(py, values.iter().map(|v| v.1)))?;
+            Ok(dict)
+        })
+    }
+
+    /// Return the positions (m, d) of the inlet buffer particles.
+    fn inflow_position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        engine!(&self.0, s => vectors(py, s.inflow_position().into_iter()))
+    }
+
+    /// Prescribe the velocity of the inlet buffer particles, (d,) or (m, d) in the order of `inflow_position`.
+    fn set_inflow(&mut self, velocity: &Bound<'_, PyAny>) -> PyResult<()> {
+        engine!(&mut self.0, s => {
+            let velocity = match velocity.extract::<PyReadonlyArray1<f64>>() {
+                Ok(same) => vec![vector("inflow velocity", same.as_array().iter().copied())?; s.inflow_position().len()],
+                Err(_) => read_vectors("inflow velocity", velocity)?,
+            };
+            Ok(s.set_inflow(&velocity)?)
+        })
+    }
+}
+
+/// Stable Δt: ``penalty``, ``viscous``, ``body_force`` (inf where it does not apply), and ``lambda_max`` (λ_max Δx²).
+#[pyfunction]
+fn time_step_limits<'py>(py: Python<'py>, settings: &str, velocity_max: f64) -> PyResult<Bound<'py, PyDict>> {
+    let settings = Settings::from_json(settings)?;
+    let lambda = settings.largest_laplacian_eigenvalue();
+    let limits = settings.time_step_limits(velocity_max, lambda);
+    let dict = PyDict::new(py);
+    dict.set_item("penalty", limits.penalty)?;
+    dict.set_item("viscous", limits.viscous)?;
+    dict.set_item("body_force", limits.body_force)?;
+    dict.set_item("lambda_max", lambda)?;
+    Ok(dict)
+}
+
+/// Estimate the engine's memory per particle, buffers and neighbour list included.
+#[pyfunction]
+fn bytes_per_particle(settings: &str) -> PyResult<f64> {
+    let settings = Settings::from_json(settings)?;
+    let ratio = settings.support_radius() / settings.particle_spacing;
+    let (pairs, pair, fields) = match settings.dimensions {
+        2 => (std::f64::consts::PI * ratio * ratio, size_of::<Pair<2>>(), 16 * size_of::<Vector<2>>()),
+        _ => (4.0 / 3.0 * std::f64::consts::PI * ratio.powi(3), size_of::<Pair<3>>(), 16 * size_of::<Vector<3>>()),
+    };
+    // The rows grow by doubling, so half of their room may be empty.
+    Ok(1.5 * pairs * pair as f64 + fields as f64 + 100.0)
+}
+
+#[pymodule]
+fn _alsph(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("SolverError", module.py().get_type::<SolverError>())?;
+    module.add("ConfigError", module.py().get_type::<ConfigError>())?;
+    module.add_class::<PySimulation>()?;
+    module.add_function(wrap_pyfunction!(time_step_limits, module)?)?;
+    module.add_function(wrap_pyfunction!(bytes_per_particle, module)?)
+}
+
+const KIND_NAMES: [&str; 4] = ["fluid", "inlet", "outlet", "solid"];
+
+fn wall(seconds: Option<f64>) -> PyResult<Option<Duration>> {
+    let convert =
+        |s| Duration::try_from_secs_f64(s).map_err(|e| ConfigError::new_err(format!("argument `wall_seconds`: {e}")));
+    seconds.map(convert).transpose()
+}
+
+fn vector<const D: usize>(name: &'static str, mut values: impl ExactSizeIterator<Item = f64>) -> PyResult<Vector<D>> {
+    if values.len() != D {
+        return Err(array_error(name, format!("must have {D} components, not {}", values.len())));
+    }
+    Ok(Vector::from_fn(|_, _| values.next().unwrap_or_default()))
+}
+
+fn vectors<'py, const D: usize>(
+    py: Python<'py>,
+    values: impl ExactSizeIterator<Item = Vector<D>>,
+) -> Bound<'py, PyArray2<f64>> {
+    let mut array = Array2::zeros((values.len(), D));
+    for (mut row, value) in array.rows_mut().into_iter().zip(values) {
+        row.iter_mut().zip(value.iter()).for_each(|(to, from)| *to = *from);
+    }
+    array.into_pyarray(py)
+}
+
+fn read_vectors<const D: usize>(name: &'static str, array: &Bound<'_, PyAny>) -> PyResult<Vec<Vector<D>>> {
+    let array: PyReadonlyArray2<f64> =
+        array.extract().map_err(|_| array_error(name, format!("must be a float64 array of shape (n, {D})")))?;
+    array.as_array().rows().into_iter().map(|row| vector(name, row.iter().copied())).collect()
+}
+
+fn read_array<T: numpy::Element + Copy>(state: &Bound<'_, PyDict>, name: &'static str, count: usize) -> PyResult<Vec<T>> {
+    let item = state.get_item(name)?.ok_or_else(|| array_error(name, "is missing from the state"))?;
+    let array: PyReadonlyArray1<T> = item.extract().map_err(|_| {
+        let kind = item.get_type().to_string();
+        array_error(name, format!("must be a one-dimensional {} array, not {kind}", std::any::type_name::<T>()))
+    })?;
+    let array = array.as_array();
+    if array.len() != count {
+        return Err(array_error(name, format!("has {} entries for {count} positions", array.len())));
+    }
+    Ok(array.to_vec())
+}
+
+fn read_rows<const D: usize>(
+    state: &Bound<'_, PyDict>,
+    name: &'static str,
+    count: Option<usize>,
+) -> PyResult<Vec<Vector<D>>> {
+    let item = state.get_item(name)?.ok_or_else(|| array_error(name, "is missing from the state"))?;
+    let rows = read_vectors(name, &item)?;
+    match count {
+        Some(count) if count != rows.len() => {
+            Err(array_error(name, format!("has {} rows for {count} positions", rows.len())))
+        }
+        _ => Ok(rows),
+    }
+}
+
+fn read_particles<const D: usize>(state: &Bound<'_, PyDict>) -> PyResult<Particles<D>> {
+    let position = read_rows(state, "position", None)?;
+    let count = position.len();
+    let kind = read_array::<u8>(state, "kind", count)?.into_iter().map(ParticleKind::try_from).collect::<Result<_, _>>()?;
+    let id = if state.contains("id")? { read_array(state, "id", count)? } else { (0..count as u64).collect() };
+    Ok(Particles {
+        real: count,
+        velocity: read_rows(state, "velocity", Some(count))?,
+        pressure: read_array(state, "pressure", count)?,
+        kind,
+        body: read_array(state, "body", count)?,
+        normal: read_rows(state, "normal", Some(count))?,
+        depth: read_array(state, "depth", count)?,
+        id,
+        position,
+    })
+}
+
+fn read_clock(state: &Bound<'_, PyDict>) -> PyResult<Clock> {
+    fn scalar<'py, T: Default + for<'a> FromPyObject<'a, 'py>>(
+        state: &Bound<'py, PyDict>,
+        name: &'static str,
+    ) -> PyResult<T> {
+        match state.get_item(name)? {
+            Some(value) => value.extract().map_err(|_| array_error(name, "must be a number not below zero")),
+            None => Ok(T::default()),
+        }
+    }
+    Ok(Clock {
+        time: scalar(state, "time")?,
+        step: scalar(state, "step")?,
+        mass_in: scalar(state, "mass_in")?,
+        mass_out: scalar(state, "mass_out")?,
+        next_id: scalar(state, "next_id")?,
+    })
+}
+
+fn state<'py, const D: usize>(py: Python<'py>, particles: &Particles<D>, clock: Clock) -> PyResult<Bound<'py, PyDict>> {
+    let real = particles.real;
+    let dict = PyDict::new(py);
+    dict.set_item("position", vectors(py, particles.position[..real].iter().copied()))?;
+    dict.set_item("velocity", vectors(py, particles.velocity[..real].iter().copied()))?;
+    dict.set_item("pressure", PyArray1::from_slice(py, &particles.pressure[..real]))?;
+    dict.set_item("kind", PyArray1::from_iter(py, particles.kind[..real].iter().map(|&kind| kind as u8)))?;
+    dict.set_item("body", PyArray1::from_slice(py, &particles.body[..real]))?;
+    dict.set_item("normal", vectors(py, particles.normal[..real].iter().copied()))?;
+    dict.set_item("depth", PyArray1::from_slice(py, &particles.depth[..real]))?;
+    dict.set_item("id", PyArray1::from_slice(py, &particles.id[..real]))?;
+    dict.set_item("time", clock.time)?;
+    dict.set_item("step", clock.step)?;
+    dict.set_item("mass_in", clock.mass_in)?;
+    dict.set_item("mass_out", clock.mass_out)?;
+    dict.set_item("next_id", clock.next_id)?;
+    Ok(dict)
+}
+
+fn snapshot<'py, const D: usize>(
+    py: Python<'py>,
+    simulation: &mut Simulation<D>,
+) -> PyResult<(Bound<'py, PyDict>, Vec<Matrix<D>>)> {
+    let snapshot = py.detach(|| simulation.snapshot());
+    let dict = state(py, simulation.particles(), simulation.clock())?;
+    let divergence: Vec<f64> = snapshot.velocity_gradient.iter().map(|gradient| gradient.trace()).collect();
+    dict.set_item("volume", snapshot.volume.into_pyarray(py))?;
+    dict.set_item("velocity_divergence", divergence.into_pyarray(py))?;
+    Ok((dict, snapshot.velocity_gradient))
+}
+
+fn history<'py, const D: usize>(py: Python<'py>, reports: &[Report<D>], bodies: usize) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    let numbers: [(&str, fn(&Report<D>) -> f64); 12] = [
+        ("time", |r| r.clock.time),
+        ("time_step", |r| r.time_step),
+        ("divergence_max", |r| r.outcome.divergence_max),
+        ("divergence_mean", |r| r.outcome.divergence_sum / r.fluid.max(1) as f64),
+        ("divergence_sum", |r| r.outcome.divergence_sum),
+        ("velocity_max", |r| r.velocity_max),
+        ("penalty_coefficient", |r| r.penalty),
+        ("volume", |r| r.volume),
+        ("kinetic_energy", |r| r.kinetic_energy),
+        ("mass_in", |r| r.clock.mass_in),
+        ("mass_out", |r| r.clock.mass_out),
+        ("inlet_pressure", |r| r.inlet_pressure),
+    ];
+    for (name, number) in numbers {
+        dict.set_item(name, PyArray1::from_iter(py, reports.iter().map(number)))?;
+    }
+    let integers = |f: &dyn Fn(&Report<D>) -> u64| PyArray1::from_iter(py, reports.iter().map(f));
+    dict.set_item("step", integers(&|r| r.clock.step))?;
+    dict.set_item("iterations", integers(&|r| r.outcome.iterations as u64))?;
+    dict.set_item("converged", PyArray1::from_iter(py, reports.iter().map(|r| r.outcome.converged)))?;
+    for (k, name) in KIND_NAMES.iter().enumerate() {
+        dict.set_item(name, integers(&|r| r.counts[k] as u64))?;
+    }
+    let loads = |name: &str, width: usize, f: &dyn Fn(&crate::loads::Load<D>, usize) -> f64| {
+        let values =
+            reports.iter().flat_map(|r| r.loads.iter().flat_map(|load| (0..width).map(|k| f(load, k)))).collect::<Vec<_>>();
+        dict.set_item(name, PyArray1::from_vec(py, values).reshape([reports.len(), bodies, width])?)
+    };
+    let spin = if D == 2 { 1 } else { 3 };
+    loads("pressure_force", D, &|load, k| load.pressure_force[k])?;
+    loads("viscous_force", D, &|load, k| load.viscous_force[k])?;
+    loads("pressure_torque", spin, &|load, k| load.pressure_torque[3 - spin + k])?;
+    loads("viscous_torque", spin, &|load, k| load.viscous_torque[3 - spin + k])?;
+    Ok(dict)
+}

@@ -1,0 +1,81 @@
+//! What is recorded of a step.
+
+use crate::loads::Load;
+use crate::parallel;
+use crate::particles::{ParticleKind, Particles};
+use crate::scheme::{Outcome, Step};
+use crate::settings::{Boundary, Settings};
+use crate::simulation::Clock;
+
+#[derive(Clone, Debug)]
+pub struct Report<const D: usize> {
+    /// At the end of the step.
+    pub clock: Clock,
+    pub time_step: f64,
+    pub outcome: Outcome,
+    /// u_max at the start of the step.
+    pub velocity_max: f64,
+    /// r_AL.
+    pub penalty: f64,
+    /// Fluid particles that the sums of this report run over.
+    pub fluid: usize,
+    /// Σ V_i and ½ρ Σ V_i u_i² of the fluid.
+    pub volume: f64,
+    pub kinetic_energy: f64,
+    /// Mean pressure within Δx of the inlet plane; NaN without an inlet.
+    pub inlet_pressure: f64,
+    /// Fluid, inlet, outlet, solid at the end of the step.
+    pub counts: [usize; 4],
+    pub loads: Vec<Load<D>>,
+}
+
+impl<const D: usize> Report<D> {
+    /// The report of a step whose iteration has ended and whose particles have not yet been shifted.
+    pub fn new(
+        step: Step,
+        outcome: Outcome,
+        particles: &Particles<D>,
+        volume: &[f64],
+        velocity_max: f64,
+        loads: Vec<Load<D>>,
+    ) -> Self {
+        let sums = |range: std::ops::Range<usize>| {
+            range
+                .filter(|&i| particles.kind[i] == ParticleKind::Fluid)
+                .fold([0.0; 2], |sums, i| [sums[0] + volume[i], sums[1] + volume[i] * particles.velocity[i].norm_squared()])
+        };
+        let [total, square] = parallel::reduce(particles.real, sums, |a, b| [a[0] + b[0], a[1] + b[1]]).unwrap_or_default();
+        Self {
+            clock: Clock::default(),
+            time_step: step.time_step,
+            outcome,
+            velocity_max,
+            penalty: step.penalty,
+            fluid: particles.counts()[ParticleKind::Fluid as usize],
+            volume: total,
+            kinetic_energy: 0.5 * step.settings.density * square,
+            inlet_pressure: inlet_pressure(step.settings, particles),
+            counts: [0; 4],
+            loads,
+        }
+    }
+}
+
+fn inlet_pressure<const D: usize>(settings: &Settings, particles: &Particles<D>) -> f64 {
+    let domain = &settings.domain;
+    let planes = domain.boundaries.iter().enumerate().flat_map(|(axis, sides)| {
+        let planes = [domain.lower[axis], domain.upper[axis]];
+        sides.iter().zip(planes).filter(|(side, _)| **side == Boundary::Inlet).map(move |(_, plane)| (axis, plane))
+    });
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (axis, plane) in planes {
+        for i in 0..particles.real {
+            let near = (particles.position[i][axis] - plane).abs() <= settings.particle_spacing;
+            if near && particles.kind[i] != ParticleKind::Solid {
+                sum += particles.pressure[i];
+                count += 1.0;
+            }
+        }
+    }
+    sum / count
+}

@@ -1,0 +1,255 @@
+//! The ALSPH step: equations (8) to (13) of the paper.
+
+use crate::boundary::{Walls, shepard};
+use crate::frame::Frame;
+use crate::operators;
+use crate::parallel;
+use crate::particles::{ParticleKind, Particles, Vector};
+use crate::settings::{DerivativeFrame, Settings, VelocityLaplacian, WallPressure, WallVelocity};
+
+/// How a step ended.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Outcome {
+    pub iterations: usize,
+    /// Whether ε of (13) was reached, else the cap ended the iteration.
+    pub converged: bool,
+    /// max |∇·u| over the fluid.
+    pub divergence_max: f64,
+    /// Σ |∇·u| over the fluid.
+    pub divergence_sum: f64,
+}
+
+/// The fields of one step beside those of the particles, real particles and images.
+#[derive(Debug, Default)]
+pub struct Alsph<const D: usize> {
+    /// r^n, u^n, p^n of the real particles.
+    pub position_initial: Vec<Vector<D>>,
+    pub velocity_initial: Vec<Vector<D>>,
+    pub pressure_initial: Vec<f64>,
+    /// ∇·u^m and p^m side by side, because (8) and (10) read them together.
+    divergence_pressure: Vec<[f64; 2]>,
+    velocity_laplacian: Vec<Vector<D>>,
+    /// u*.
+    velocity_star: Vec<Vector<D>>,
+    pressure_laplacian: Vec<f64>,
+}
+
+/// What stays the same during one step.
+#[derive(Clone, Copy)]
+pub struct Step<'a> {
+    pub settings: &'a Settings,
+    /// Δt.
+    pub time_step: f64,
+    /// r_AL.
+    pub penalty: f64,
+}
+
+impl<const D: usize> Alsph<D> {
+    /// Advance velocity and pressure to n+1 and leave `particles.position` at the frame of the last derivatives; see
+    /// [`Alsph::advance_positions`]. `frame` holds the stencil at r^n.
+    pub fn iterate(
+        &mut self,
+        step: Step,
+        particles: &mut Particles<D>,
+        frame: &mut Frame<D>,
+        walls: &mut Walls<D>,
+    ) -> Outcome {
+        self.begin(particles);
+        self.velocity_derivatives(step, particles, frame, walls);
+        for iteration in 1.. {
+            self.predict_velocity(step, particles, frame); // (8)
+            self.update_pressure(step, particles, frame); // (10) (20)
+            self.correct_velocity(step, particles, frame); // (11)
+            if step.settings.derivative_frame == DerivativeFrame::Updated {
+                self.advance_positions(step, particles, frame); // (12): Algorithm 1 takes its derivatives at r^{n+1,m}
+                frame.update(step.settings, particles);
+            }
+            self.velocity_derivatives(step, particles, frame, walls);
+            let (divergence_max, divergence_sum) = self.divergence_norms(particles); // (13)
+            let converged = divergence_max <= step.settings.divergence_tolerance;
+            if converged || iteration == step.settings.max_iterations {
+                return Outcome { iterations: iteration, converged, divergence_max, divergence_sum };
+            }
+        }
+        unreachable!("the loop ends at its cap")
+    }
+
+    /// ∇·u of the last iteration.
+    pub fn divergence(&self, i: usize) -> f64 {
+        self.divergence_pressure[i][0]
+    }
+
+    fn begin(&mut self, particles: &Particles<D>) {
+        let (real, count) = (particles.real, particles.len());
+        copy(&particles.position[..real], &mut self.position_initial);
+        copy(&particles.velocity[..real], &mut self.velocity_initial);
+        copy(&particles.pressure[..real], &mut self.pressure_initial);
+        self.divergence_pressure.clear();
+        self.divergence_pressure.extend(particles.pressure.iter().map(|&p| [0.0, p]));
+        self.velocity_laplacian.resize(real, Vector::zeros());
+        self.velocity_star.resize(count, Vector::zeros());
+        self.pressure_laplacian.resize(real, 0.0);
+    }
+
+    /// ∇·u^m and ∇²u^m.
+    fn velocity_derivatives(&mut self, step: Step, particles: &Particles<D>, frame: &Frame<D>, walls: &mut Walls<D>) {
+        extrapolate_wall_velocity(step.settings, particles, frame, walls);
+        let real = particles.real;
+        let velocity = &particles.velocity;
+        let vector_form = step.settings.velocity_laplacian == VelocityLaplacian::Vector;
+        let walls = &*walls;
+        frame.stencil.neighbours.for_each(
+            &mut self.divergence_pressure[..real],
+            &mut self.velocity_laplacian,
+            |i, row, [divergence, _], laplacian| {
+                (*laplacian, *divergence) = operators::laplacian_and_divergence(row.flowing(), velocity, velocity[i]);
+                *divergence += operators::divergence(row.solid(), velocity, velocity[i]);
+                for pair in row.solid() {
+                    *laplacian += (walls.seen_by(particles, pair.j(), i) - velocity[i]) * f64::from(pair.laplacian);
+                }
+                if vector_form {
+                    *laplacian = operators::vector_laplacian(row.all(), &particles.position, velocity, i);
+                }
+            },
+        );
+        frame.images.scalars(&mut self.divergence_pressure);
+    }
+
+    /// u* (8), and ∇²p^m for (10), which reads the same neighbours.
+    fn predict_velocity(&mut self, step: Step, particles: &Particles<D>, frame: &Frame<D>) {
+        let real = particles.real;
+        let gravity = Vector::<D>::from_column_slice(&step.settings.body_force);
+        let (dt, viscosity) = (step.time_step, step.settings.kinematic_viscosity);
+        let paper_walls = step.settings.wall_pressure == WallPressure::Paper;
+        let fields = &self.divergence_pressure;
+        let (initial, laplacian) = (&self.velocity_initial, &self.velocity_laplacian);
+        frame.stencil.neighbours.for_each(
+            &mut self.velocity_star[..real],
+            &mut self.pressure_laplacian,
+            |i, row, star, pressure_laplacian| {
+                let (penalty, p) = operators::gradient_and_laplacian(row.all(), fields, fields[i]);
+                let still = match particles.kind[i] {
+                    ParticleKind::Outlet => true,
+                    ParticleKind::Solid => !paper_walls,
+                    _ => false,
+                };
+                *pressure_laplacian = p;
+                *star = if still {
+                    initial[i]
+                } else {
+                    initial[i] + (penalty * step.penalty + laplacian[i] * viscosity + gravity) * dt
+                };
+            },
+        );
+        frame.images.vectors(&mut self.velocity_star);
+    }
+
+    /// p^{m+1} (10), with the pressure of solid particles (20).
+    fn update_pressure(&mut self, step: Step, particles: &mut Particles<D>, frame: &Frame<D>) {
+        let Particles { real, kind, normal, pressure, .. } = particles;
+        let (kind, normal) = (&*kind, &*normal);
+        let Step { settings, time_step: dt, penalty } = step;
+        let paper_walls = settings.wall_pressure == WallPressure::Paper;
+        let (star, initial, laplacian) = (&self.velocity_star, &self.velocity_initial, &self.pressure_laplacian);
+        frame.stencil.neighbours.for_each_one(&mut pressure[..*real], |i, row, p| {
+            let solid = kind[i] == ParticleKind::Solid;
+            if kind[i] == ParticleKind::Outlet {
+                *p = 0.0;
+            } else if !solid || paper_walls {
+                let divergence = operators::divergence(row.all(), star, star[i]);
+                *p -= penalty * (settings.density * divergence - dt * laplacian[i]);
+            }
+            if solid && paper_walls {
+                // ∂p/∂n r_s with the pseudo-acceleration Δu/Δt and, from (12), the pseudo-displacement ½ Δu Δt.
+                *p += 0.5 * settings.density * (star[i] - initial[i]).dot(&normal[i]).powi(2);
+            }
+        });
+        if !paper_walls {
+            extrapolate_wall_pressure(settings, particles, frame);
+        }
+        frame.images.scalars(&mut particles.pressure);
+        for (fields, &p) in self.divergence_pressure.iter_mut().zip(&particles.pressure) {
+            fields[1] = p;
+        }
+    }
+
+    /// u^{m+1} (11). Buffers and solids keep their velocities.
+    fn correct_velocity(&mut self, step: Step, particles: &mut Particles<D>, frame: &Frame<D>) {
+        let Particles { real, kind, pressure, velocity, .. } = particles;
+        let (kind, pressure, star) = (&*kind, &*pressure, &self.velocity_star);
+        let factor = step.time_step / step.settings.density;
+        frame.stencil.neighbours.for_each_one(&mut velocity[..*real], |i, row, u| {
+            if kind[i] == ParticleKind::Fluid {
+                *u = star[i] - operators::gradient(row.all(), pressure, pressure[i]) * factor;
+            }
+        });
+        frame.images.vectors(&mut particles.velocity);
+    }
+
+    /// r^{n+1} (12), for everything that moves with its velocity.
+    pub fn advance_positions(&self, step: Step, particles: &mut Particles<D>, frame: &Frame<D>) {
+        let Particles { real, kind, body, velocity, position, .. } = particles;
+        let bodies = &step.settings.bodies;
+        for i in 0..*real {
+            let fixed = kind[i] == ParticleKind::Solid && !bodies[body[i] as usize].moves;
+            if !fixed {
+                position[i] = self.position_initial[i] + (self.velocity_initial[i] + velocity[i]) * (0.5 * step.time_step);
+            }
+        }
+        frame.images.positions(position);
+    }
+
+    /// max and Σ of |∇·u| over the fluid.
+    fn divergence_norms(&self, particles: &Particles<D>) -> (f64, f64) {
+        let norms = |range: std::ops::Range<usize>| {
+            range.filter(|&i| particles.kind[i] == ParticleKind::Fluid).fold((0.0, 0.0), |(max, sum): (f64, f64), i| {
+                let value = self.divergence(i).abs();
+                // NaN must not hide behind max, which drops it.
+                (if value > max || value.is_nan() { value } else { max }, sum + value)
+            })
+        };
+        let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
+        parallel::reduce(particles.real, norms, |a, b| (larger(a.0, b.0), a.1 + b.1)).unwrap_or_default()
+    }
+}
+
+/// The velocity of solid particles in the viscous term: 2 u_wall minus the Shepard average of the fluid's (Adami, Hu and
+/// Adams 2012, eq. 23). Other rules need no preparation.
+fn extrapolate_wall_velocity<const D: usize>(
+    settings: &Settings,
+    particles: &Particles<D>,
+    frame: &Frame<D>,
+    walls: &mut Walls<D>,
+) {
+    if settings.wall_velocity != WallVelocity::Adami {
+        return;
+    }
+    let Particles { real, kind, position, velocity, .. } = particles;
+    walls.viscous_velocity.resize(particles.len(), Vector::zeros());
+    frame.stencil.neighbours.for_each_one(&mut walls.viscous_velocity[..*real], |i, row, seen| {
+        if kind[i] == ParticleKind::Solid {
+            let average = shepard(settings, position, row, i, |j, _| velocity[j].into());
+            *seen = average.map_or(velocity[i], |average| velocity[i] * 2.0 - Vector::from(average));
+        }
+    });
+    frame.images.vectors(&mut walls.viscous_velocity);
+}
+
+/// The pressure of solid particles: the Shepard average of the fluid's with the hydrostatic term (Adami, Hu and Adams
+/// 2012, eq. 27; bodies do not accelerate).
+fn extrapolate_wall_pressure<const D: usize>(settings: &Settings, particles: &mut Particles<D>, frame: &Frame<D>) {
+    let gravity = Vector::<D>::from_column_slice(&settings.body_force);
+    let Particles { real, kind, position, pressure, .. } = particles;
+    let fluid = pressure.clone();
+    frame.stencil.neighbours.for_each_one(&mut pressure[..*real], |i, row, p| {
+        if kind[i] == ParticleKind::Solid {
+            let at = |j: usize, r_ij: Vector<D>| [fluid[j] + settings.density * gravity.dot(&r_ij)];
+            *p = shepard(settings, position, row, i, at).map_or(0.0, |[average]| average);
+        }
+    });
+}
+
+fn copy<T: Copy>(from: &[T], to: &mut Vec<T>) {
+    to.clear();
+    to.extend_from_slice(from);
+}

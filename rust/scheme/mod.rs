@@ -1,0 +1,5 @@
+//! Time integration schemes.
+
+mod alsph;
+
+pub use alsph::{Alsph, Outcome, Step};

@@ -1,0 +1,289 @@
+//! Numerical settings, their validation and the stability law of the time step.
+
+use crate::error::{Result, setting};
+use crate::kernel::{KernelKind, Smoothing};
+use crate::with_kernel;
+use serde::{Deserialize, Serialize};
+
+/// At which positions the derivatives inside the iteration are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DerivativeFrame {
+    /// Algorithm 1: ⟨ ⟩ at r^{n+1,m}.
+    Updated,
+    /// Algorithm 2: ⟨ ⟩ at r^n.
+    Initial,
+}
+
+/// Form of the viscous Laplacian (16).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VelocityLaplacian {
+    /// One compact scalar Laplacian a component.
+    Scalar,
+    /// (16) as printed, with the correction tensor.
+    Vector,
+}
+
+/// Velocity scale of the particle shift (18).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shifting {
+    /// The XSPH velocity modulus u_v, as in (18).
+    Xsph,
+    /// `shift_coefficient` times the largest velocity, the older form.
+    MaximumVelocity,
+    None,
+}
+
+/// Velocity that a solid particle shows to the viscous term of a fluid neighbour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WallVelocity {
+    /// The velocity of the wall itself, as in the paper.
+    Paper,
+    /// 2 u_wall minus the Shepard average of the fluid's (Adami, Hu and Adams 2012).
+    Adami,
+    /// Per pair, linear through u_wall at the surface, with the ratio of distances limited (Morris, Fox and Zhu 1997).
+    Morris,
+}
+
+/// Pressure of a solid particle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WallPressure {
+    /// (10) with the pseudo-velocity of (8), then (20).
+    Paper,
+    /// Shepard average of the fluid's with the hydrostatic term (Adami, Hu and Adams 2012).
+    Adami,
+}
+
+/// What closes one side of the domain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Boundary {
+    None,
+    Slip,
+    Periodic,
+    Inlet,
+    Outlet,
+}
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Domain {
+    pub lower: Vec<f64>,
+    pub upper: Vec<f64>,
+    /// [lower side, upper side] of each direction.
+    pub boundaries: Vec<[Boundary; 2]>,
+}
+
+/// A solid body or wall: the solid particles with its index.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Body {
+    pub name: String,
+    /// Prescribed velocity.
+    pub velocity: Vec<f64>,
+    /// Whether the particles move with that velocity (a cavity's lid slides in place: false).
+    pub moves: bool,
+    /// Point that the torque is taken about.
+    pub center: Vec<f64>,
+}
+
+/// All that governs a simulation beside its particles. Any consistent units.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    pub dimensions: usize,
+    /// Δx.
+    pub particle_spacing: f64,
+    /// h/Δx.
+    pub smoothing_ratio: f64,
+    pub kernel: KernelKind,
+    pub density: f64,
+    /// ν.
+    pub kinematic_viscosity: f64,
+    /// Body force per unit mass, g.
+    pub body_force: Vec<f64>,
+    /// Largest Δt.
+    pub time_step: f64,
+    /// Take less than `time_step` where the stability law asks for it.
+    pub adaptive_time_step: bool,
+    /// Fraction of the stability law that an adaptive step may use.
+    pub time_step_safety: f64,
+    pub derivative_frame: DerivativeFrame,
+    /// Search the neighbours again in every iteration (Fatehi et al. 2019). Only with the updated frame.
+    pub search_every_iteration: bool,
+    /// Cap of the inner iterations.
+    pub max_iterations: usize,
+    /// ε of (13), 1/time.
+    pub divergence_tolerance: f64,
+    /// C_BV.
+    pub penalty_constant: f64,
+    pub velocity_laplacian: VelocityLaplacian,
+    pub shifting: Shifting,
+    /// β of the maximum-velocity shift.
+    pub shift_coefficient: f64,
+    /// Largest shift in a step over Δx.
+    pub shift_limit: f64,
+    pub wall_velocity: WallVelocity,
+    pub wall_pressure: WallPressure,
+    pub domain: Domain,
+    pub bodies: Vec<Body>,
+}
+
+/// Upper bounds of Δt; infinite where one does not apply.
+#[derive(Clone, Copy, Debug)]
+pub struct TimeStepLimits {
+    /// r_AL Δt λ_max < 2 (method section 3).
+    pub penalty: f64,
+    /// 0.125 h²/ν.
+    pub viscous: f64,
+    /// 0.25 sqrt(h/|g|).
+    pub body_force: f64,
+}
+
+impl Settings {
+    /// Parse and validate.
+    pub fn from_json(text: &str) -> Result<Self> {
+        let settings: Self = serde_json::from_str(text).map_err(|e| setting("settings", e.to_string()))?;
+        settings.validate()?;
+        Ok(settings)
+    }
+
+    /// h.
+    pub fn smoothing_length(&self) -> f64 {
+        self.smoothing_ratio * self.particle_spacing
+    }
+
+    /// Radius beyond which the kernel vanishes.
+    pub fn support_radius(&self) -> f64 {
+        self.kernel.support() * self.smoothing_length()
+    }
+
+    /// Length of the inlet and outlet buffers: 6h, in whole spacings.
+    pub fn buffer_length(&self) -> f64 {
+        (6.0 * self.smoothing_ratio - 1e-9).ceil() * self.particle_spacing
+    }
+
+    /// λ_max Δx²: the largest eigenvalue of the negative compact Laplacian on a square lattice, sought over the wave
+    /// vectors of the Brillouin zone.
+    pub fn largest_laplacian_eigenvalue(&self) -> f64 {
+        let (ratio, dimensions) = (self.smoothing_ratio, self.dimensions);
+        let weights = with_kernel!(self.kernel, K => {
+            let smoothing = Smoothing::<K>::new(ratio, dimensions);
+            lattice(dimensions, self.kernel.support() * ratio)
+                .map(|r| {
+                    let distance = r.iter().map(|x| x * x).sum::<f64>().sqrt();
+                    let value = smoothing.value(distance);
+                    let slope = if distance > 0.0 { smoothing.gradient_over_distance(distance) } else { 0.0 };
+                    (r, distance, value, slope)
+                })
+                .collect::<Vec<_>>()
+        });
+        let volume = 1.0 / weights.iter().map(|w| w.2).sum::<f64>();
+        let trace: f64 = weights.iter().map(|w| -volume * w.3 * w.1 * w.1).sum();
+        let factor = 2.0 * (dimensions as f64 + 2.0) / (2.0 + trace);
+        let samples = 16;
+        lattice(dimensions, samples as f64 * (dimensions as f64).sqrt())
+            .filter(|k| k.iter().all(|&x| (0.0..=samples as f64).contains(&x)))
+            .map(|k| {
+                let phase = |r: &[f64; 3]| (0..3).map(|a| k[a] * r[a]).sum::<f64>() * std::f64::consts::PI / samples as f64;
+                weights.iter().map(|(r, _, _, slope)| -factor * volume * slope * (1.0 - phase(r).cos())).sum()
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// Stability limits for the largest velocity `velocity_max`.
+    pub fn time_step_limits(&self, velocity_max: f64, largest_eigenvalue: f64) -> TimeStepLimits {
+        let gravity = self.body_force.iter().map(|g| g * g).sum::<f64>().sqrt();
+        let h = self.smoothing_length();
+        let wave = velocity_max * (self.penalty_constant * largest_eigenvalue / 2.0).sqrt();
+        TimeStepLimits {
+            penalty: self.particle_spacing / wave,
+            viscous: 0.125 * h * h / self.kinematic_viscosity,
+            body_force: 0.25 * (h / gravity).sqrt(),
+        }
+    }
+
+    fn validate(&self) -> Result<()> {
+        if !(2..=3).contains(&self.dimensions) {
+            return Err(setting("dimensions", format!("must be 2 or 3, not {}", self.dimensions)));
+        }
+        let positive = [
+            ("particle_spacing", self.particle_spacing),
+            ("smoothing_ratio", self.smoothing_ratio),
+            ("density", self.density),
+            ("time_step", self.time_step),
+            ("time_step_safety", self.time_step_safety),
+            ("divergence_tolerance", self.divergence_tolerance),
+            ("shift_limit", self.shift_limit),
+        ];
+        for (name, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(setting(name, format!("must be a positive number, not {value}")));
+            }
+        }
+        for (name, value) in
+            [("kinematic_viscosity", self.kinematic_viscosity), ("shift_coefficient", self.shift_coefficient)]
+        {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(setting(name, format!("must be a number not below zero, not {value}")));
+            }
+        }
+        if !(0.8..=3.0).contains(&self.smoothing_ratio) {
+            return Err(setting("smoothing_ratio", format!("must lie in 0.8..3, not {}", self.smoothing_ratio)));
+        }
+        if !(1.0..=100.0).contains(&self.penalty_constant) {
+            return Err(setting("penalty_constant", format!("must lie in 1..100, not {}", self.penalty_constant)));
+        }
+        if self.max_iterations == 0 {
+            return Err(setting("max_iterations", "must be at least 1"));
+        }
+        if self.search_every_iteration && self.derivative_frame == DerivativeFrame::Initial {
+            return Err(setting("search_every_iteration", "needs derivative_frame = \"updated\""));
+        }
+        self.validate_vector("body_force", &self.body_force)?;
+        for body in &self.bodies {
+            self.validate_vector(&format!("bodies.{}.velocity", body.name), &body.velocity)?;
+            self.validate_vector(&format!("bodies.{}.center", body.name), &body.center)?;
+        }
+        self.validate_domain()
+    }
+
+    fn validate_vector(&self, name: &str, vector: &[f64]) -> Result<()> {
+        if vector.len() != self.dimensions || !vector.iter().all(|x| x.is_finite()) {
+            return Err(setting(name, format!("must be {} finite numbers, not {vector:?}", self.dimensions)));
+        }
+        Ok(())
+    }
+
+    fn validate_domain(&self) -> Result<()> {
+        let Domain { lower, upper, boundaries } = &self.domain;
+        self.validate_vector("domain.lower", lower)?;
+        self.validate_vector("domain.upper", upper)?;
+        if boundaries.len() != self.dimensions {
+            return Err(setting("domain.boundaries", format!("must have {} pairs, one a direction", self.dimensions)));
+        }
+        for (axis, pair) in boundaries.iter().enumerate() {
+            if upper[axis] - lower[axis] < self.support_radius() {
+                let problem = format!("direction {axis} is shorter than the support radius {}", self.support_radius());
+                return Err(setting("domain", problem));
+            }
+            if (pair[0] == Boundary::Periodic) != (pair[1] == Boundary::Periodic) {
+                return Err(setting("domain.boundaries", format!("direction {axis} is periodic on one side only")));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Points of the unit lattice within `radius` of the origin, in a fixed order.
+fn lattice(dimensions: usize, radius: f64) -> impl Iterator<Item = [f64; 3]> {
+    let n = radius.ceil() as i64;
+    let third = if dimensions == 3 { n } else { 0 };
+    (-n..=n)
+        .flat_map(move |i| (-n..=n).flat_map(move |j| (-third..=third).map(move |k| [i as f64, j as f64, k as f64])))
+        .filter(move |r| r.iter().map(|x| x * x).sum::<f64>() <= radius * radius)
+}

@@ -1,0 +1,323 @@
+//! A simulation: particles, settings and the order of the stages of a step.
+
+use crate::boundary::{self, Walls};
+use crate::error::{Error, Result, setting};
+use crate::frame::Frame;
+use crate::interpolation::interpolate;
+use crate::loads::loads;
+use crate::operators;
+use crate::parallel;
+use crate::particles::{Matrix, ParticleKind, Particles, Vector};
+use crate::report::Report;
+use crate::scheme::{Alsph, Step};
+use crate::settings::{DerivativeFrame, Settings};
+use crate::shifting::shift;
+use rayon::ThreadPool;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// The adaptive time step may not fall below this fraction of the user's: by then the velocity has blown up.
+const SMALLEST_TIME_STEP: f64 = 1e-2;
+
+/// Counters that go on through a restart.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Clock {
+    pub time: f64,
+    pub step: u64,
+    /// Mass that has crossed the inlet and outlet planes.
+    pub mass_in: f64,
+    pub mass_out: f64,
+    /// Smallest unused particle id.
+    pub next_id: u64,
+}
+
+pub struct Simulation<const D: usize> {
+    settings: Settings,
+    particles: Particles<D>,
+    clock: Clock,
+    frame: Frame<D>,
+    walls: Walls<D>,
+    scheme: Alsph<D>,
+    largest_eigenvalue: f64,
+    /// Whether `frame` belongs to the present positions.
+    prepared: bool,
+    history: Vec<Report<D>>,
+    pool: Arc<ThreadPool>,
+}
+
+impl<const D: usize> Simulation<D> {
+    /// A simulation that goes on from `particles` (no images) and `clock`, on `threads` threads (all cores if none given).
+    pub fn new(settings: Settings, mut particles: Particles<D>, mut clock: Clock, threads: Option<usize>) -> Result<Self> {
+        if settings.dimensions != D {
+            return Err(setting("dimensions", format!("{} does not fit {D}-dimensional arrays", settings.dimensions)));
+        }
+        check_particles(&settings, &mut particles)?;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.unwrap_or(0))
+            .build()
+            .map_err(|e| setting("threads", e.to_string()))?;
+        clock.next_id = clock.next_id.max(particles.id.iter().max().map_or(0, |id| id + 1));
+        Ok(Self {
+            walls: Walls::new(&settings),
+            largest_eigenvalue: settings.largest_laplacian_eigenvalue(),
+            settings,
+            particles,
+            clock,
+            frame: Frame::default(),
+            scheme: Alsph::default(),
+            prepared: false,
+            history: Vec::new(),
+            pool: Arc::new(pool),
+        })
+    }
+
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The particles; entries beyond `real` are images.
+    pub fn particles(&self) -> &Particles<D> {
+        &self.particles
+    }
+
+    pub fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    pub fn threads(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+
+    /// One report a step since the last call.
+    pub fn take_history(&mut self) -> Vec<Report<D>> {
+        std::mem::take(&mut self.history)
+    }
+
+    /// Take up to `steps` steps, fewer if `wall` time passes first. Returns the number taken.
+    pub fn advance(&mut self, steps: u64, wall: Option<Duration>) -> Result<u64> {
+        let last = self.clock.step + steps;
+        self.step_while(wall, |clock| clock.step < last)
+    }
+
+    /// Step until `time` is reached (true) or `wall` time has passed (false).
+    pub fn advance_until(&mut self, time: f64, wall: Option<Duration>) -> Result<bool> {
+        self.step_while(wall, |clock| clock.time < time)?;
+        Ok(self.clock.time >= time)
+    }
+
+    fn step_while(&mut self, wall: Option<Duration>, more: impl Fn(&Clock) -> bool) -> Result<u64> {
+        let (start, first) = (Instant::now(), self.clock.step);
+        while more(&self.clock) {
+            self.on_pool(Self::step)?;
+            if wall.is_some_and(|wall| start.elapsed() >= wall) {
+                break;
+            }
+        }
+        Ok(self.clock.step - first)
+    }
+
+    /// Run `f` with the simulation's own threads.
+    fn on_pool<R: Send>(&mut self, f: impl FnOnce(&mut Self) -> R + Send) -> R {
+        let pool = Arc::clone(&self.pool);
+        pool.install(|| f(self))
+    }
+
+    /// One time step: the stages of the method in order.
+    fn step(&mut self) -> Result<()> {
+        let velocity_max = self.velocity_max();
+        let time_step = self.time_step(velocity_max)?;
+        self.prepare();
+        let penalty = self.settings.penalty_constant * velocity_max * velocity_max * time_step;
+        let step = Step { settings: &self.settings, time_step, penalty };
+
+        let outcome = self.scheme.iterate(step, &mut self.particles, &mut self.frame, &mut self.walls);
+        if let Err(error) = self.check_fields() {
+            self.restore_initial();
+            return Err(error);
+        }
+        let loads = loads(step.settings, &self.particles, &self.frame, &self.walls);
+        let mut report = Report::new(step, outcome, &self.particles, &self.frame.stencil.volume, velocity_max, loads);
+        self.scheme.advance_positions(step, &mut self.particles, &mut self.frame); // (12)
+        shift(step.settings, &mut self.particles, &self.frame, time_step, velocity_max); // (18) (19)
+        self.end_step(time_step);
+        report.clock = self.clock;
+        report.counts = self.particles.counts();
+        self.history.push(report);
+        Ok(())
+    }
+
+    /// Bring order, images, neighbours and stencil up to the present positions.
+    fn prepare(&mut self) {
+        if self.prepared {
+            return;
+        }
+        // Algorithm 1 moves particles while the list is in use; 1.2 leaves room for acceleration within the step.
+        let skin = match self.settings.derivative_frame {
+            DerivativeFrame::Updated => {
+                2.4 * (self.velocity_max() * self.settings.time_step).min(self.settings.particle_spacing)
+            }
+            DerivativeFrame::Initial => 0.0,
+        };
+        self.frame.search(&self.settings, &mut self.particles, skin);
+        self.prepared = true;
+    }
+
+    /// Boundary crossings and clock.
+    fn end_step(&mut self, time_step: f64) {
+        self.particles.drop_images();
+        let flow = boundary::end_step(&mut self.particles, &self.settings, &self.frame.grid, &mut self.clock.next_id);
+        self.clock.mass_in += flow.inflow;
+        self.clock.mass_out += flow.outflow;
+        self.clock.time += time_step;
+        self.clock.step += 1;
+        self.prepared = false;
+    }
+
+    /// Largest velocity modulus of the particles: what u_max stands for in r_AL and in the stability law.
+    fn velocity_max(&self) -> f64 {
+        let velocity = &self.particles.velocity[..self.particles.real];
+        velocity.iter().map(|u| u.norm_squared()).fold(0.0, f64::max).sqrt()
+    }
+
+    /// Δt of the next step.
+    fn time_step(&self, velocity_max: f64) -> Result<f64> {
+        let settings = &self.settings;
+        if !settings.adaptive_time_step {
+            return Ok(settings.time_step);
+        }
+        let limits = settings.time_step_limits(velocity_max, self.largest_eigenvalue);
+        let penalty = settings.time_step_safety * limits.penalty;
+        if penalty < SMALLEST_TIME_STEP * settings.time_step {
+            let velocity = &self.particles.velocity[..self.particles.real];
+            let fastest =
+                (0..velocity.len()).max_by(|&a, &b| velocity[a].norm_squared().total_cmp(&velocity[b].norm_squared()));
+            return Err(self.diverged(fastest.unwrap_or(0), "velocity", velocity_max));
+        }
+        Ok(settings.time_step.min(penalty).min(limits.viscous).min(limits.body_force))
+    }
+
+    /// An error if the step left a value that is not a number.
+    fn check_fields(&self) -> Result<()> {
+        let particles = &self.particles;
+        for i in 0..particles.real {
+            let velocity = particles.velocity[i].sum();
+            if !velocity.is_finite() {
+                return Err(self.diverged(i, "velocity", velocity));
+            }
+            if !particles.pressure[i].is_finite() {
+                return Err(self.diverged(i, "pressure", particles.pressure[i]));
+            }
+        }
+        Ok(())
+    }
+
+    fn diverged(&self, i: usize, field: &'static str, value: f64) -> Error {
+        let particles = &self.particles;
+        let position = particles.position[i].as_slice().to_vec();
+        let Clock { time, step, .. } = self.clock;
+        Error::Diverged { step: step + 1, time, particle: particles.id[i], position, field, value }
+    }
+
+    /// Go back to the state before the step.
+    fn restore_initial(&mut self) {
+        self.particles.drop_images();
+        self.particles.position.copy_from_slice(&self.scheme.position_initial);
+        self.particles.velocity.copy_from_slice(&self.scheme.velocity_initial);
+        self.particles.pressure.copy_from_slice(&self.scheme.pressure_initial);
+        self.prepared = false;
+    }
+
+    /// The derived fields of the real particles, in the order of `particles()` after the call.
+    pub fn snapshot(&mut self) -> Snapshot<D> {
+        self.on_pool(|simulation| {
+            simulation.prepare();
+            let particles = &simulation.particles;
+            let mut gradient = vec![Matrix::zeros(); particles.real];
+            simulation.frame.stencil.neighbours.for_each_one(&mut gradient, |i, row, gradient| {
+                *gradient = operators::velocity_gradient(row.all(), &particles.velocity, particles.velocity[i]);
+            });
+            Snapshot { volume: simulation.frame.stencil.volume[..particles.real].to_vec(), velocity_gradient: gradient }
+        })
+    }
+
+    /// Fluid pressure and velocity at `points`; NaN where no fluid is near.
+    pub fn sample(&mut self, points: &[Vector<D>]) -> Vec<(f64, Vector<D>)> {
+        self.on_pool(|simulation| {
+            simulation.prepare();
+            let mut values = vec![(f64::NAN, Vector::repeat(f64::NAN)); points.len()];
+            parallel::for_each(&mut values, |k, value| {
+                if let Some(sample) =
+                    interpolate(&simulation.settings, &simulation.particles, &simulation.frame.grid, &points[k])
+                {
+                    *value = sample;
+                }
+            });
+            values
+        })
+    }
+
+    /// Positions of the inlet buffer particles.
+    pub fn inflow_position(&self) -> Vec<Vector<D>> {
+        self.inlet_particles().map(|i| self.particles.position[i]).collect()
+    }
+
+    /// Prescribe the velocities of the inlet buffer particles, in the order of `inflow_position`.
+    pub fn set_inflow(&mut self, velocity: &[Vector<D>]) -> Result<()> {
+        let inlet: Vec<_> = self.inlet_particles().collect();
+        if velocity.len() != inlet.len() {
+            let problem = format!("{} rows for {} inlet particles", velocity.len(), inlet.len());
+            return Err(Error::Array { name: "inflow velocity", problem });
+        }
+        if let Some(bad) = velocity.iter().find(|u| !u.iter().all(|x| x.is_finite())) {
+            return Err(Error::Array { name: "inflow velocity", problem: format!("{:?} is not finite", bad.as_slice()) });
+        }
+        for (i, u) in inlet.into_iter().zip(velocity) {
+            self.particles.velocity[i] = *u;
+        }
+        // Images carry velocities too.
+        self.prepared = false;
+        Ok(())
+    }
+
+    fn inlet_particles(&self) -> impl Iterator<Item = usize> {
+        (0..self.particles.real).filter(|&i| self.particles.kind[i] == ParticleKind::Inlet)
+    }
+}
+
+/// Fields derived from the particles at one time.
+pub struct Snapshot<const D: usize> {
+    pub volume: Vec<f64>,
+    /// ∂u_k/∂x_l as the entry (k, l).
+    pub velocity_gradient: Vec<Matrix<D>>,
+}
+
+/// Refuse arrays that cannot be simulated; give solid particles the velocity of their body.
+fn check_particles<const D: usize>(settings: &Settings, particles: &mut Particles<D>) -> Result<()> {
+    let array = |name, problem| Err(Error::Array { name, problem });
+    if !particles.kind.contains(&ParticleKind::Fluid) {
+        return array("kind", "holds no fluid particle (0)".into());
+    }
+    for i in 0..particles.len() {
+        let finite = |v: &Vector<D>| v.iter().all(|x| x.is_finite());
+        if !finite(&particles.position[i]) {
+            return array("position", format!("particle {i} is at {:?}", particles.position[i].as_slice()));
+        }
+        if !finite(&particles.velocity[i]) {
+            return array("velocity", format!("of particle {i} is {:?}", particles.velocity[i].as_slice()));
+        }
+        if !particles.pressure[i].is_finite() {
+            return array("pressure", format!("of particle {i} is {}", particles.pressure[i]));
+        }
+        if particles.kind[i] == ParticleKind::Solid {
+            let Some(body) = settings.bodies.get(particles.body[i] as usize) else {
+                return array(
+                    "body",
+                    format!("particle {i} belongs to body {}, of {}", particles.body[i], settings.bodies.len()),
+                );
+            };
+            particles.velocity[i] = Vector::from_column_slice(&body.velocity);
+        }
+    }
+    particles.real = particles.len();
+    Ok(())
+}
