@@ -1,0 +1,24 @@
+"""The cases, by name. A new case is one file and one entry here."""
+
+from alsph.cases.base import Case
+from alsph.cases.cylinder import Cylinder
+from alsph.cases.taylor_green import TaylorGreen
+from alsph.errors import ConfigError
+from alsph.parameters import suggest
+
+CASES: dict[str, type[Case]] = {case.name: case for case in (Cylinder, TaylorGreen)}
+
+__all__ = ["CASES", "Case", "Cylinder", "TaylorGreen", "find"]
+
+
+def find(name: str) -> type[Case]:
+    """Return the case with that name.
+
+    Raises
+    ------
+    ConfigError
+        If there is none.
+    """
+    if name not in CASES:
+        raise ConfigError(f"unknown case '{name}'; {suggest(name, CASES)}")
+    return CASES[name]

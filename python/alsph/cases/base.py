@@ -1,0 +1,263 @@
+"""What all cases share: the numerical parameters, and how a case becomes a simulation or a run."""
+
+from __future__ import annotations
+
+import math
+import os
+from abc import abstractmethod
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from alsph.errors import ConfigError
+from alsph.geometry import FloatArray, Problem
+from alsph.parameters import Parameters
+
+if TYPE_CHECKING:
+    from alsph.results import Run
+    from alsph.simulation import Simulation
+
+SUPPORT = {"quintic_spline": 3, "wendland_c2": 2, "wendland_c4": 2}
+"""Support radius of each kernel in smoothing lengths."""
+
+
+class Case(Parameters):
+    """A flow problem with its numerical parameters.
+
+    Every case is computed in its own reference units: lengths in D, velocities in U, density in ρ, hence times in D/U,
+    pressures in ρU² and kinematic viscosity 1/Re. What D and U are, each case says.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    default_until: ClassVar[float]
+    velocity_max: ClassVar[float] = 1.0
+    """Expected largest velocity in U, for estimates of the time step."""
+    coefficient_body: ClassVar[str | None] = None
+
+    reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
+    resolution: int = Field(default=20, ge=8, description="particles per reference length, D/Δx [-]")
+    time_step: float = Field(default=0.0508, gt=0, description="upper bound of the time step, ΔtU/Δx [-]")
+    adaptive_time_step: bool = Field(
+        default=True, description="take a smaller time step where the stability law asks for it"
+    )
+    time_step_safety: float = Field(
+        default=0.9, gt=0, le=1, description="fraction of the stability law's time step taken [-]"
+    )
+    algorithm: Literal[1, 2, "original"] = Field(
+        default=2,
+        description="derivatives at updated positions (1), initial positions (2), or 1 with a search every iteration",
+    )
+    max_iterations: int = Field(default=5, ge=1, description="cap of the inner iterations of a step [-]")
+    tolerance: float = Field(default=1e-3, gt=0, description="largest |∇·u| at which the iterations end, ε [U/D]")
+    penalty_constant: float = Field(default=100.0, ge=1, le=100, description="penalty constant C_BV = (c/u_max)² [-]")
+    smoothing_ratio: float = Field(
+        default=4 / 3, ge=1, le=2, description="smoothing length over particle spacing, h/Δx [-]"
+    )
+    kernel: Literal["quintic_spline", "wendland_c2", "wendland_c4"] = Field(
+        default="quintic_spline", description="smoothing kernel; support 3h, 2h, 2h"
+    )
+    velocity_laplacian: Literal["scalar", "vector"] = Field(
+        default="scalar", description="viscous term per component, or eq. (16) as printed"
+    )
+    shifting: Literal["xsph", "maximum_velocity", "none"] = Field(
+        default="xsph", description="particle shifting: eq. (18), with β u_max in place of the XSPH velocity, or none"
+    )
+    shift_coefficient: float = Field(default=0.04, ge=0, le=1, description="β of the maximum_velocity shifting [-]")
+    shift_limit: float = Field(default=0.1, gt=0, le=0.5, description="largest shift in a step [Δx]")
+    wall_velocity: Literal["paper", "adami", "morris"] = Field(
+        default="adami",
+        description="velocity of solid particles in the viscous term: the body's own, or extrapolated for no-slip",
+    )
+    wall_pressure: Literal["paper", "adami"] = Field(
+        default="paper", description="pressure of solid particles: eqs. (10) and (20), or Shepard extrapolation"
+    )
+
+    @property
+    @abstractmethod
+    def space_dimensions(self) -> int:
+        """Number of space dimensions, 2 or 3."""
+
+    @abstractmethod
+    def domain(self) -> dict[str, Any]:
+        """Return ``lower``, ``upper`` and ``boundaries`` of the domain."""
+
+    @abstractmethod
+    def particles(self) -> dict[str, NDArray[Any]]:
+        """Return the particles at the start."""
+
+    @abstractmethod
+    def particle_estimate(self) -> int:
+        """Return about how many particles :meth:`particles` makes, without making them."""
+
+    def bodies(self) -> list[dict[str, Any]]:
+        """Return the solid bodies."""
+        return []
+
+    def surface_points(self) -> tuple[FloatArray, FloatArray] | None:
+        """Return ``angle`` (m,) [degrees from the front] and ``position`` (m, d) of the C_p samples."""
+        return None
+
+    @property
+    def particle_spacing(self) -> float:
+        """Particle spacing Δx [D]."""
+        return 1.0 / self.resolution
+
+    @property
+    def support_layers(self) -> int:
+        """Support radius in particle spacings, rounded up."""
+        return math.ceil(SUPPORT[self.kernel] * self.smoothing_ratio - 1e-9)
+
+    def settings(self) -> dict[str, Any]:
+        """Return the engine's settings (see docs/architecture.md)."""
+        shared = (
+            "smoothing_ratio kernel adaptive_time_step time_step_safety max_iterations penalty_constant "
+            "velocity_laplacian shifting shift_coefficient shift_limit wall_velocity wall_pressure"
+        )
+        return {name: getattr(self, name) for name in shared.split()} | {
+            "dimensions": self.space_dimensions,
+            "particle_spacing": self.particle_spacing,
+            "density": 1.0,
+            "kinematic_viscosity": 1.0 / self.reynolds,
+            "body_force": [0.0] * self.space_dimensions,
+            "time_step": self.time_step * self.particle_spacing,
+            "derivative_frame": "initial" if self.algorithm == 2 else "updated",
+            "search_every_iteration": self.algorithm == "original",
+            "divergence_tolerance": self.tolerance,
+            "domain": self.domain(),
+            "bodies": self.bodies(),
+        }
+
+    def build(self) -> Problem:
+        """Return the problem that the engine starts from.
+
+        Raises
+        ------
+        ConfigError
+            If the particles would not fit into the memory that is free.
+        """
+        needed, free = self.memory(), _free_memory()
+        if needed > free:
+            raise ConfigError(
+                f"resolution = {self.resolution}: about {self.particle_estimate():,} particles need "
+                f"{needed / 2**30:.1f} GiB of memory and {free / 2**30:.1f} GiB are free; lower the resolution"
+            )
+        return self.problem(self.particles())
+
+    def problem(self, state: dict[str, Any]) -> Problem:
+        """Return this case with the given state, for instance one from a checkpoint."""
+        return Problem(self.settings(), state, self.coefficient_body)
+
+    def simulation(self, threads: int | None = None) -> Simulation:
+        """Return a :class:`alsph.Simulation` of this case, at its start.
+
+        Parameters
+        ----------
+        threads
+            Number of threads; all cores if None.
+        """
+        from alsph.simulation import Simulation
+
+        return Simulation(self.build(), threads, until=self.default_until)
+
+    def run(
+        self,
+        folder: str | Path,
+        until: float | None = None,
+        threads: int | None = None,
+        *,
+        force: bool = False,
+        progress: bool = True,
+        **settings: Any,
+    ) -> Run:
+        """Run the case to `until`, write a run folder, and return its results.
+
+        Parameters
+        ----------
+        folder
+            The run folder to create.
+        until
+            End time [D/U]; the case's own default if None.
+        threads
+            Number of threads; all cores if None.
+        force
+            Replace an existing run folder.
+        progress
+            Report progress.
+        **settings
+            Further settings of :class:`alsph.config.RunSettings`, such as ``output_interval``.
+
+        Raises
+        ------
+        ConfigError, RunFolderError
+            Before anything is written.
+        SolverError
+            If the computation breaks down; the folder keeps the last checkpoint.
+        KeyboardInterrupt
+            At Ctrl-C, after a checkpoint has been written.
+        """
+        from alsph.config import Config, RunSettings
+        from alsph.run import start
+
+        config = Config(self, RunSettings(until=until, threads=threads, **settings))
+        return start(config, Path(folder), force=force, progress=progress)
+
+    def memory(self) -> float:
+        """Return the estimated peak memory of a simulation [bytes]."""
+        from alsph.simulation import bytes_per_particle
+
+        return bytes_per_particle(self.settings()) * self.particle_estimate()
+
+    def time_step_limits(self) -> dict[str, float]:
+        """Return the stable ΔtU/Δx at the expected largest velocity: ``penalty``, ``viscous``, ``body_force``."""
+        from alsph.simulation import time_step_limits
+
+        limits = time_step_limits(self.settings(), self.velocity_max)
+        return {name: limits[name] / self.particle_spacing for name in ("penalty", "viscous", "body_force")}
+
+    def time_step_warning(self) -> str | None:
+        """Return a warning if the time step lies above the stability law, which it names."""
+        limits = self.time_step_limits()
+        binding = min(limits, key=lambda name: limits[name])
+        if self.time_step <= limits[binding]:
+            return None
+        remedy = (
+            "adaptive_time_step takes smaller steps"
+            if self.adaptive_time_step
+            else "expect divergence: lower time_step or switch adaptive_time_step on"
+        )
+        return (
+            f"time_step = {self.time_step:.4g} lies above the {binding.replace('_', ' ')} stability limit "
+            f"{limits[binding]:.4g} (ΔtU/Δx at u_max = {self.velocity_max:g} U); {remedy}"
+        )
+
+    def whole_cells(self, name: str, length: float) -> int:
+        """Return how many particle spacings a `length` [D] is; it must be a whole number of them.
+
+        Raises
+        ------
+        ValueError
+            If it is not, with the lengths next to it that are.
+        """
+        cells = length * self.resolution
+        if abs(cells - round(cells)) > 1e-6:
+            below, above = np.floor(cells) / self.resolution, np.ceil(cells) / self.resolution
+            raise ValueError(
+                f"{name} = {length:g}: not a whole number of particle spacings (1/{self.resolution}); "
+                f"use {below:.6g} or {above:.6g}"
+            )
+        return round(cells)
+
+
+def _free_memory() -> float:
+    """Memory that can be had without swapping [bytes]; infinite where the system does not tell."""
+    try:
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return float(line.split()[1]) * 1024
+        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (OSError, ValueError):
+        return math.inf

@@ -1,0 +1,226 @@
+"""The command line: ``alsph run | resume | describe | plot | info | cases``.
+
+The options of ``run`` and ``describe`` are the fields of the case and of :class:`alsph.config.RunSettings`.
+"""
+
+import functools
+import inspect
+import types
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from typer.core import TyperGroup
+
+from alsph import _alsph, cases, config
+from alsph.config import Config, RunSettings
+from alsph.describe import describe
+from alsph.errors import AlsphError
+from alsph.parameters import Parameters, describe_default
+from alsph.results import Run
+from alsph.run import resume, start
+
+INTERRUPTED = 130
+
+
+@contextmanager
+def _exit_codes() -> Iterator[None]:
+    """Turn errors into one line on stderr and an exit code: 2 user's mistake, 1 solver, 130 Ctrl-C."""
+    try:
+        yield
+    except AlsphError as error:
+        typer.secho(f"error: {error}", fg="red", err=True)
+        raise typer.Exit(error.exit_code) from None
+    except KeyboardInterrupt as stop:
+        typer.echo(str(stop) or "interrupted", err=True)
+        raise typer.Exit(INTERRUPTED) from None
+
+
+class CaseGroup(TyperGroup):
+    """Commands named after the cases; the name of a TOML file stands for the case in it, with its parameters."""
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return the command of a case, or of the case in a file."""
+        with _exit_codes():
+            if cmd_name.endswith(".toml"):
+                ctx.obj = config.load(cmd_name)
+                cmd_name = ctx.obj.case.name
+            return super().get_command(ctx, cases.find(cmd_name).name)
+
+
+app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, help="Augmented Lagrangian SPH.")
+group_settings: dict[str, Any] = {
+    "cls": CaseGroup,
+    "no_args_is_help": True,
+    "subcommand_metavar": "CASE|FILE.toml [OPTIONS]",
+}
+run_app = typer.Typer(help="Run a case, or a configuration file, into a new run folder.", **group_settings)
+describe_app = typer.Typer(
+    help="Tell what a run will take: particles, memory, time step limits, time.", **group_settings
+)
+app.add_typer(run_app, name="run")
+app.add_typer(describe_app, name="describe")
+
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="run folder")]
+
+
+def _run(
+    configuration: Config,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="run folder", show_default="runs/CASE")] = None,
+    force: Annotated[bool, typer.Option("--force", help="replace an existing run folder")] = False,
+) -> None:
+    _print_summary(start(configuration, output or Path("runs") / configuration.case.name, force=force))
+
+
+def _describe(
+    configuration: Config,
+    probe: Annotated[bool, typer.Option(help="take a few steps to estimate the time")] = True,
+) -> None:
+    _print_table(describe(configuration, probe=probe))
+
+
+def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Callable[..., None]:
+    """Return a command for a case: `action` called with the configuration that the options make."""
+    own = list(inspect.signature(action).parameters.values())[1:]
+
+    @_exit_codes()
+    def command(context: typer.Context, **values: Any) -> None:
+        extra = {parameter.name: values.pop(parameter.name) for parameter in own}
+        tables = (context.obj or Config(model())).tables()
+        for name, value in values.items():
+            if value is not None:
+                (tables["run"] if name in RunSettings.model_fields else tables)[name] = value
+        action(config.from_tables(tables), **extra)
+
+    first = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
+    keywords = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own]
+    parameters = [first, *keywords, *_options(model), *_options(RunSettings)]
+    functools.update_wrapper(command, action)
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return command
+
+
+def _options(model: type[Parameters]) -> Iterator[inspect.Parameter]:
+    """Make one option, optional, of each field of a model."""
+    for name, field in model.model_fields.items():
+        kind, choices = _option_type(field.annotation)
+        flag = f"--{name.replace('_', '-')}"
+        option = typer.Option(
+            f"{flag}/--no-{flag[2:]}" if kind is bool else flag,
+            help=f"{model.describe(name)}",
+            show_default=describe_default(model, name),
+            metavar="|".join(map(str, choices)) or None,
+            parser=functools.partial(_choose, choices) if choices else None,
+            rich_help_panel=_panel(model, name),
+        )
+        yield inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=None,
+            annotation=Annotated[Union[kind, None], option],  # noqa: UP007
+        )
+
+
+def _panel(model: type[Parameters], name: str) -> str:
+    if model is RunSettings:
+        return "Run"
+    return (
+        "Numerical method" if name in cases.Case.model_fields and name not in ("reynolds", "resolution") else "Problem"
+    )
+
+
+def _option_type(annotation: Any) -> tuple[type, tuple[Any, ...]]:
+    """Return the type that an option is read as, and its choices if there are few."""
+    if get_origin(annotation) in (Union, types.UnionType):
+        annotation = next(member for member in get_args(annotation) if member is not type(None))
+    if get_origin(annotation) is Literal:
+        return str, get_args(annotation)
+    return annotation, ()
+
+
+def _choose(choices: tuple[Any, ...], text: str) -> Any:
+    return next((choice for choice in choices if str(choice) == text), text)
+
+
+for _model in cases.CASES.values():
+    for _group, _action in ((run_app, _run), (describe_app, _describe)):
+        _group.command(_model.name, help=(_model.__doc__ or "").split("\n\nParameters\n")[0])(
+            _case_command(_model, _action)
+        )
+
+
+@app.command("resume")
+@_exit_codes()
+def _resume(
+    path: RunPath,
+    until: Annotated[float | None, typer.Option(help="new end time [D/U]", show_default="the run's")] = None,
+    threads: Annotated[int | None, typer.Option(help="number of threads", show_default="the run's")] = None,
+) -> None:
+    """Go on with a run from its last checkpoint."""
+    _print_summary(resume(path, until, threads))
+
+
+@app.command("plot")
+@_exit_codes()
+def _plot(
+    path: RunPath,
+    field: Annotated[list[str], typer.Option(help="field to draw, may be repeated")] = ["vorticity", "pressure"],  # noqa: B006
+    time: Annotated[float | None, typer.Option(help="time of the fields [D/U]", show_default="the last")] = None,
+) -> None:
+    """Draw the figures of a run into RUN/figures: forces, pressure coefficient, history, fields."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    run = Run(path)
+    figures = path / "figures"
+    drawings: dict[str, Callable[[Path], object]] = {"history": run.plot_history}
+    if run.bodies:
+        drawings |= {"forces": run.plot_forces, "pressure_coefficient": run.plot_pressure_coefficient}
+    drawings |= {name: functools.partial(run.plot_field, name, time) for name in field}
+    figures.mkdir(exist_ok=True)
+    for name, draw in drawings.items():
+        draw(figures / f"{name}.png")
+        typer.echo(figures / f"{name}.png")
+
+
+@app.command("info")
+@_exit_codes()
+def _info(path: RunPath) -> None:
+    """Tell the state and the results of a run."""
+    _print_summary(Run(path))
+
+
+@app.command("cases")
+def _cases() -> None:
+    """List the cases."""
+    _print_table([(name, model.title) for name, model in cases.CASES.items()])
+
+
+@app.callback(invoke_without_command=True)
+def _version(version: Annotated[bool, typer.Option("--version", help="print the version")] = False) -> None:
+    if version:
+        typer.echo(_alsph.__version__)
+        raise typer.Exit
+
+
+def _print_summary(run: Run) -> None:
+    _print_table([(name, str(value)) for name, value in run.summary().items()])
+
+
+def _print_table(rows: list[tuple[str, str]]) -> None:
+    table = Table.grid(padding=(0, 2))
+    for row in rows:
+        table.add_row(*row)
+    Console(highlight=False, soft_wrap=True).print(table, markup=False)
+
+
+def main() -> None:
+    """Run the command line."""
+    warnings.formatwarning = lambda message, *_args, **_kwargs: f"warning: {message}\n"
+    app()

@@ -1,0 +1,88 @@
+"""Configuration files: a case and the settings of a run, from and to TOML."""
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from pydantic import Field
+
+from alsph import cases
+from alsph.errors import ConfigError
+from alsph.parameters import Parameters
+
+
+class RunSettings(Parameters):
+    """Settings of a run: how long, on how many threads, and what is written when."""
+
+    until: float | None = Field(default=None, gt=0, description="end time [D/U]; the case's own default if not given")
+    threads: int | None = Field(default=None, ge=1, le=4096, description="number of threads; all cores if not given")
+    output_interval: float = Field(default=1.0, gt=0, description="time between two outputs of the particles [D/U]")
+    surface_interval: float = Field(
+        default=0.1, gt=0, description="time between two samples of the surface pressure [D/U]"
+    )
+    checkpoint_minutes: float = Field(default=10.0, gt=0, description="longest time between two checkpoints [min]")
+    flush_seconds: float = Field(
+        default=2.0, gt=0, description="longest time that rows of the history stay unwritten [s]"
+    )
+
+
+@dataclass(frozen=True)
+class Config:
+    """A case and the settings of its run."""
+
+    case: cases.Case
+    run: RunSettings = RunSettings()
+
+    @property
+    def until(self) -> float:
+        """End time [D/U]."""
+        return self.run.until or self.case.default_until
+
+    def tables(self) -> dict[str, Any]:
+        """Return the content of the configuration file; what is not set is left out."""
+        return {"case": self.case.name} | self.case.model_dump() | {"run": self.run.model_dump(exclude_none=True)}
+
+    def save(self, path: Path) -> None:
+        """Write the configuration with all its parameters to a TOML file."""
+        path.write_text(tomli_w.dumps(self.tables()), encoding="utf-8")
+
+
+def from_tables(tables: dict[str, Any]) -> Config:
+    """Return the configuration with these tables: ``case``, the parameters of the case, and a table ``run``.
+
+    Raises
+    ------
+    ConfigError
+        If a key is unknown or a value cannot be used; the message starts with the key's path.
+    """
+    parameters = dict(tables)
+    name, run = parameters.pop("case", None), parameters.pop("run", {})
+    if not isinstance(name, str):
+        raise ConfigError(f'case = {name!r}: name a case, for instance case = "cylinder"')
+    if not isinstance(run, dict):
+        raise ConfigError(f"run = {run!r}: must be a table, [run]")
+    case = cases.find(name)(**parameters)
+    try:
+        return Config(case, RunSettings(**run))
+    except ConfigError as error:
+        raise ConfigError(f"run.{error}") from None
+
+
+def load(path: str | Path) -> Config:
+    """Read a configuration file.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be read or used; the message starts with the file's name.
+    """
+    try:
+        return from_tables(tomllib.loads(Path(path).read_text(encoding="utf-8")))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not a TOML file: {error}") from None
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from None

@@ -1,0 +1,63 @@
+"""What a run will take, before it is started."""
+
+import time as clock
+
+import numpy as np
+
+from alsph.config import Config
+from alsph.geometry import Kind
+from alsph.progress import duration
+from alsph.simulation import Simulation
+
+PROBE_SECONDS = 5.0
+
+
+def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
+    """Return particles, memory, time step limits, steps and estimated time of a run, in words.
+
+    Parameters
+    ----------
+    config
+        The case and the settings of its run.
+    probe
+        Take a few steps to estimate the time.
+
+    Raises
+    ------
+    ConfigError
+        If the particles would not fit into the memory that is free.
+    """
+    case = config.case
+    problem = case.build()
+    kinds = np.bincount(problem.state["kind"], minlength=len(Kind))
+    counts = ", ".join(f"{kinds[kind]:,} {kind.name.lower()}" for kind in Kind if kinds[kind])
+    limits = case.time_step_limits()
+    binding = min(limits, key=lambda name: limits[name])
+    step = min(case.time_step, case.time_step_safety * limits[binding]) if case.adaptive_time_step else case.time_step
+    steps = config.until / (step * case.particle_spacing)
+    lines = [
+        ("case", f"{case.name}: {case.title}"),
+        ("Reynolds number", f"{case.reynolds:g}"),
+        ("resolution", f"D/Δx = {case.resolution}, Δx = {case.particle_spacing:.6g} D"),
+        ("particles", f"{kinds.sum():,}: {counts}"),
+        ("memory", f"about {case.memory() / 2**20:,.0f} MiB"),
+        ("time step", f"ΔtU/Δx = {case.time_step:.4g}" + (" or less (adaptive)" if case.adaptive_time_step else "")),
+    ]
+    for name, limit in limits.items():
+        binds = " (binds)" if name == binding else ""
+        text = f"ΔtU/Δx < {limit:.4g} at u_max = {case.velocity_max:g} U{binds}" if np.isfinite(limit) else "none"
+        lines.append((f"{name.replace('_', ' ')} limit", text))
+    lines.append(("steps", f"about {steps:,.0f} to t* = {config.until:g}"))
+    if probe:
+        seconds = _seconds_per_step(Simulation(problem, config.run.threads))
+        lines.append(("estimated time", f"{duration(seconds * steps)} at {seconds:.3g} s a step"))
+    if warning := case.time_step_warning():
+        lines.append(("warning", warning))
+    return lines
+
+
+def _seconds_per_step(simulation: Simulation) -> float:
+    simulation.advance(1)  # the first step allocates
+    start = clock.perf_counter()
+    steps = simulation.advance(20, wall_seconds=PROBE_SECONDS)
+    return (clock.perf_counter() - start) / max(steps, 1)

@@ -1,0 +1,95 @@
+"""Progress of a run: a live bar on a terminal, a plain line every ten seconds elsewhere."""
+
+import time as clock
+from types import TracebackType
+from typing import Any, Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+PLAIN_SECONDS = 10.0
+
+
+class Reporter:
+    """Reports a run to the user.
+
+    Parameters
+    ----------
+    until
+        End time [D/U].
+    time
+        Time at the start [D/U].
+    enabled
+        Report at all.
+    """
+
+    def __init__(self, until: float, time: float, *, enabled: bool = True) -> None:
+        self._until, self._first_time = until, time
+        self._enabled = enabled
+        self._console = Console(highlight=False, soft_wrap=True)
+        self._bar: Progress | None = None
+        if self._console.is_terminal or self._console.is_jupyter:
+            columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[rate]}  ETA"), TimeRemainingColumn())
+            self._bar = Progress(
+                *columns, TextColumn("\n{task.fields[physics]}"), console=self._console, disable=not enabled
+            )
+            self._task = self._bar.add_task("", total=until, rate="", physics="")
+        self._start = self._last_line = clock.monotonic()
+        self._steps = 0
+
+    def __enter__(self) -> Self:
+        """Show the bar."""
+        if self._bar:
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop the bar."""
+        if self._bar:
+            self._bar.stop()
+
+    def message(self, text: str) -> None:
+        """Print a line."""
+        if self._enabled:
+            self._console.print(text, markup=False)
+
+    def update(self, rows: dict[str, Any]) -> None:
+        """Report new rows of the history."""
+        if not self._enabled or not len(rows["step"]):
+            return
+        now = clock.monotonic()
+        self._steps += len(rows["step"])
+        time, seconds = float(rows["time"][-1]), now - self._start
+        rate = f"{self._steps / seconds:.1f} steps/s" if seconds > 0 else ""
+        if self._bar:
+            self._bar.update(self._task, completed=min(time, self._until), rate=rate, physics=physics_line(rows))
+        elif now - self._last_line >= PLAIN_SECONDS:
+            self._last_line = now
+            done = (time - self._first_time) / (self._until - self._first_time)
+            left = seconds * (1 / done - 1) if done > 0 else float("inf")
+            self.message(f"{100 * time / self._until:5.1f} %  {rate}  ETA {duration(left)}  {physics_line(rows)}")
+
+
+def physics_line(rows: dict[str, Any]) -> str:
+    """Return the last row of the history in words."""
+    last = {name: values[-1] for name, values in rows.items()}
+    parts = [
+        f"t* {last['time']:.3f}",
+        f"{last['iterations']:d} iterations{'' if last['converged'] else ' (cap)'}",
+        f"max|∇·u| {last['divergence_max']:.2e}",
+    ]
+    if "drag_coefficient" in last:
+        parts += [f"C_D {last['drag_coefficient']:.3f}", f"C_L {last['lift_coefficient']:+.3f}"]
+    count = sum(int(last[kind]) for kind in ("fluid", "inlet", "outlet", "solid"))
+    return "  ".join([*parts, f"{count} particles"])
+
+
+def duration(seconds: float) -> str:
+    """Return a length of time in words."""
+    if seconds == float("inf"):
+        return "?"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"

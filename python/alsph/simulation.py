@@ -1,0 +1,238 @@
+"""The simulation: particles, and the means to step them. The only Python module that calls the engine."""
+
+import json
+import math
+import time as clock
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from alsph import _alsph
+from alsph.errors import ConfigError, SolverError
+from alsph.geometry import FloatArray, Problem
+
+Inflow = Callable[[FloatArray, float], ArrayLike]
+"""Velocity (m, d) or (d,) of the inlet particles, from their positions (m, d) and the time."""
+
+SLICE_SECONDS = 0.2
+"""Longest time in the engine without a look at signals, so that Ctrl-C works."""
+
+
+def bytes_per_particle(settings: dict[str, Any]) -> float:
+    """Return the engine's estimated memory per particle [bytes]."""
+    with _translated():
+        return _alsph.bytes_per_particle(json.dumps(settings))
+
+
+def time_step_limits(settings: dict[str, Any], velocity_max: float) -> dict[str, float]:
+    """Return the stable time steps ``penalty``, ``viscous``, ``body_force`` [D/U], and ``lambda_max`` (λ_max Δx²)."""
+    with _translated():
+        return _alsph.time_step_limits(json.dumps(settings), velocity_max)
+
+
+@contextmanager
+def _translated() -> Iterator[None]:
+    try:
+        yield
+    except _alsph.ConfigError as error:
+        raise ConfigError(str(error)) from None
+    except _alsph.SolverError as error:
+        raise SolverError(str(error)) from None
+
+
+class Simulation:
+    """State and stepping of one simulation.
+
+    Parameters
+    ----------
+    problem
+        Settings and particles, for instance from ``case.build()``.
+    threads
+        Number of threads; all cores if None. The result does not depend on it.
+    until
+        Default end time of :meth:`steps`.
+
+    Raises
+    ------
+    ConfigError
+        If the settings or the particles cannot be used.
+    """
+
+    def __init__(self, problem: Problem, threads: int | None = None, until: float = math.inf) -> None:
+        self.problem = problem
+        self.until = until
+        self._inflow: Inflow | None = None
+        self._history: list[dict[str, NDArray[Any]]] = []
+        self._start(problem.state, threads)
+
+    def _start(self, state: dict[str, Any], threads: int | None) -> None:
+        with _translated():
+            self._engine = _alsph.Simulation(json.dumps(self.problem.settings), state, threads)
+
+    @property
+    def time(self) -> float:
+        """Time reached [D/U]."""
+        return self._engine.time
+
+    @property
+    def step(self) -> int:
+        """Number of steps taken."""
+        return self._engine.step
+
+    @property
+    def threads(self) -> int:
+        """Number of threads."""
+        return self._engine.threads
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of particles by kind: ``fluid``, ``inlet``, ``outlet``, ``solid``."""
+        return self._engine.counts
+
+    def advance(self, steps: int = 1, wall_seconds: float = math.inf) -> int:
+        """Take up to `steps` steps, stop early after `wall_seconds`, and return the number taken.
+
+        Raises
+        ------
+        SolverError
+            If the computation breaks down.
+        """
+        first = self.step
+        for seconds in _slices(wall_seconds):
+            left = first + steps - self.step
+            if left <= 0:
+                break
+            with _translated():
+                self._engine.advance(self._prescribe(left), seconds)
+        return self.step - first
+
+    def run_until(self, time: float, wall_seconds: float = math.inf) -> bool:
+        """Step until ``self.time >= time`` (True) or `wall_seconds` have passed (False).
+
+        The time step is never clipped, so the time reached lies up to one step beyond `time`.
+
+        Raises
+        ------
+        SolverError
+            If the computation breaks down.
+        """
+        for seconds in _slices(wall_seconds):
+            if self.time >= time:
+                break
+            with _translated():
+                if self._prescribe(2) == 1:
+                    self._engine.advance(1)
+                else:
+                    self._engine.advance_until(time, seconds)
+        return self.time >= time
+
+    def steps(self, every: float, until: float | None = None) -> Iterator[dict[str, NDArray[Any]]]:
+        """Step to the next multiple of `every` [D/U], yield a :meth:`snapshot`, and so on until `until`."""
+        until = self.until if until is None else until
+        while self.time < until:
+            self.run_until(min(next_multiple(self.time, every), until))
+            yield self.snapshot()
+
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """Return the particles.
+
+        Returns
+        -------
+        dict
+            ``position``, ``velocity``, ``normal`` (n, d), ``pressure``, ``volume``, ``velocity_divergence``, ``kind``,
+            ``body``, ``depth``, ``id`` (n,) and ``vorticity``, (n,) in 2-D and (n, 3) in 3-D.
+        """
+        return self._engine.snapshot()
+
+    def history(self) -> dict[str, NDArray[Any]]:
+        """Return one row for each step taken so far.
+
+        Returns
+        -------
+        dict
+            The columns of docs/architecture.md, and the force coefficients where the case has a body.
+        """
+        self.new_history()
+        if not self._history:
+            return {}
+        self._history = [{name: np.concatenate([rows[name] for rows in self._history]) for name in self._history[0]}]
+        return self._history[0]
+
+    def new_history(self) -> dict[str, NDArray[Any]]:
+        """Return the rows of the history since the last call of this method or of :meth:`history`."""
+        rows = self._engine.take_history()
+        rows |= self._coefficients(rows)
+        if len(rows["step"]):
+            self._history.append(rows)
+        return rows
+
+    def _coefficients(self, rows: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+        """Drag and lift coefficients of the case's body with their parts: force / (½ρU²D), eqs. (21) and (22)."""
+        names = [body["name"] for body in self.problem.settings["bodies"]]
+        if self.problem.coefficient_body not in names:
+            return {}
+        body = names.index(self.problem.coefficient_body)
+        pressure, viscous = (2 * rows[f"{part}_force"][:, body] for part in ("pressure", "viscous"))
+        columns: dict[str, NDArray[Any]] = {}
+        for axis, name in enumerate(("drag", "lift")):
+            columns |= {
+                f"{name}_coefficient": pressure[:, axis] + viscous[:, axis],
+                f"{name}_pressure": pressure[:, axis],
+                f"{name}_viscous": viscous[:, axis],
+            }
+        return columns
+
+    def sample(self, points: FloatArray) -> dict[str, FloatArray]:
+        """Return the fluid's ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d); NaN far from all fluid."""
+        with _translated():
+            return self._engine.sample(np.ascontiguousarray(points, float))
+
+    def inflow_position(self) -> FloatArray:
+        """Return the positions (m, d) of the inlet particles."""
+        return self._engine.inflow_position()
+
+    def set_inflow(self, velocity: ArrayLike | Inflow) -> None:
+        """Prescribe the velocity of the inlet particles.
+
+        Parameters
+        ----------
+        velocity
+            An array (d,) or, in the order of :meth:`inflow_position`, (m, d); or a function of their positions (m, d)
+            and the time that returns such an array and is called before every step.
+        """
+        self._inflow = velocity if callable(velocity) else None
+        if not callable(velocity):
+            with _translated():
+                self._engine.set_inflow(np.ascontiguousarray(velocity, float))
+
+    def _prescribe(self, steps: int) -> int:
+        """Apply an inflow given as a function; return how many of `steps` may be taken until it is due again."""
+        if self._inflow is None:
+            return steps
+        velocity = self._inflow(self.inflow_position(), self.time)
+        self._engine.set_inflow(np.ascontiguousarray(velocity, float))
+        return 1
+
+    def state(self) -> dict[str, Any]:
+        """Return all that :meth:`restore` needs to go on from here to the last bit (an inflow function excepted)."""
+        return self._engine.state()
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go back to a state that :meth:`state` has returned; the history starts anew."""
+        self._start(state, self.threads)
+        self._history = []
+
+
+def next_multiple(time: float, interval: float) -> float:
+    """Return the smallest multiple of `interval` after `time`."""
+    return (math.floor(time / interval + 1e-9) + 1) * interval
+
+
+def _slices(wall_seconds: float) -> Iterator[float]:
+    """Yield the lengths of short slices of `wall_seconds` until they have passed."""
+    end = clock.monotonic() + wall_seconds
+    while (left := end - clock.monotonic()) > 0:
+        yield min(left, SLICE_SECONDS)
