@@ -4,7 +4,7 @@ Times are in units of D/U (t* = tU/D) and coefficients are dimensionless, so tha
 """
 
 from dataclasses import dataclass
-from typing import Any, Self, TypeAlias
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.stats import linregress
 from scipy.stats import t as student
 
-Array: TypeAlias = NDArray[np.float64]
+from alsph.geometry import FloatArray
 
 AMPLITUDE_TOLERANCE = (0.02, 0.05)  # relative bounds on how far a settled cycle's lift amplitude is from the reference
 DRAG_TOLERANCE = (0.01, 0.02)  # and on its mean drag
@@ -52,8 +52,8 @@ class Estimate(float):
         """Return ``1.487 ± 0.003``, digits down to the uncertainty's first two."""
         if np.isnan(self):
             return f"nan ({self.note})" if self.note else "nan"
-        if not self.uncertainty > 0:
-            return f"{float(self):.4g}"
+        if not self.uncertainty > 1e-6 * abs(self):
+            return f"{float(self):.6g}"
         decimals = int(np.clip(1 - np.floor(np.log10(self.uncertainty)), 0, 9))
         return f"{float(self):.{decimals}f} ± {self.uncertainty:.{decimals}f}"
 
@@ -80,7 +80,7 @@ class Window:
         How the window was chosen, in words.
     """
 
-    edges: Array
+    edges: FloatArray
     periods: int
     settled: bool
     rule: str
@@ -96,7 +96,7 @@ class Window:
         return float(self.edges[-1]) if self.edges.size else np.nan
 
 
-def batch_means(time: Array, values: Array, edges: Array) -> Array:
+def batch_means(time: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
     """Return the time averages (1/T)∫ f dt between successive edges, as in (21) and (22).
 
     Parameters
@@ -122,7 +122,7 @@ def batch_means(time: Array, values: Array, edges: Array) -> Array:
     return np.asarray(np.diff(at_edges, axis=0) / widths)
 
 
-def upward_crossings(time: Array, signal: Array, dead_band: float = 0.0) -> Array:
+def upward_crossings(time: FloatArray, signal: FloatArray, dead_band: float = 0.0) -> FloatArray:
     """Return the times at which a signal rises from below ``-dead_band`` to above ``dead_band``.
 
     Each time is the zero of a straight line fitted to the samples of the rise, so noise smaller than the dead band
@@ -134,13 +134,13 @@ def upward_crossings(time: Array, signal: Array, dead_band: float = 0.0) -> Arra
     return np.array([_zero(time[a:b], signal[a:b]) for a, b in bounds])
 
 
-def _zero(time: Array, signal: Array) -> float:
+def _zero(time: FloatArray, signal: FloatArray) -> float:
     """Zero of the straight line fitted to a short rise, kept within it."""
     slope = np.polyfit(time - time.mean(), signal, 1)[0]
     return float(np.clip(time.mean() - signal.mean() / slope, time[0], time[-1]))
 
 
-def averaging_window(time: Array, drag: Array, lift: Array) -> Window:
+def averaging_window(time: FloatArray, drag: FloatArray, lift: FloatArray) -> Window:
     """Cut the transient and return the whole shedding periods after it.
 
     Periods run between upward zero crossings of the lift. The transient ends with the first of three successive periods
@@ -167,7 +167,7 @@ def averaging_window(time: Array, drag: Array, lift: Array) -> Window:
     return Window(edges[first:], len(edges) - 1 - first, True, "periodic: whole shedding periods after the transient")
 
 
-def _cycle_edges(time: Array, lift: Array) -> Array:
+def _cycle_edges(time: FloatArray, lift: FloatArray) -> FloatArray:
     """Return the times that bound the shedding periods, empty where the lift does not oscillate regularly."""
     late = lift[time >= 0.5 * (time[0] + time[-1])]
     fluctuation = lift - late.mean()
@@ -178,7 +178,7 @@ def _cycle_edges(time: Array, lift: Array) -> Array:
     return edges
 
 
-def _first_settled_cycle(time: Array, drag: Array, lift: Array, edges: Array) -> int | None:
+def _first_settled_cycle(time: FloatArray, drag: FloatArray, lift: FloatArray, edges: FloatArray) -> int | None:
     """Index of the cycle that ends the transient, None if the cycles after it do not stay settled."""
     if len(edges) - 1 < SETTLED_CYCLES:
         return None
@@ -189,7 +189,7 @@ def _first_settled_cycle(time: Array, drag: Array, lift: Array, edges: Array) ->
     return first if runs.any() and settled[first:].mean() >= 0.8 else None
 
 
-def _settled(measure: Array, tolerance: tuple[float, float]) -> NDArray[np.bool_]:
+def _settled(measure: FloatArray, tolerance: tuple[float, float]) -> NDArray[np.bool_]:
     """Cycles within three scatters of the later half's median; the scatter is bounded by the relative tolerance."""
     later = measure[len(measure) // 2 :]
     reference = np.median(later)
@@ -198,7 +198,7 @@ def _settled(measure: Array, tolerance: tuple[float, float]) -> NDArray[np.bool_
     return np.asarray(deviation <= np.clip(3 * scatter, *np.abs(reference) * np.array(tolerance)))
 
 
-def cycle_amplitudes(time: Array, signal: Array, edges: Array) -> Array:
+def cycle_amplitudes(time: FloatArray, signal: FloatArray, edges: FloatArray) -> FloatArray:
     """Return the amplitude of a signal's fundamental in each cycle, shape (len(edges) - 1,).
 
     Unlike half the peak-to-peak range it is not raised by noise.
@@ -207,7 +207,7 @@ def cycle_amplitudes(time: Array, signal: Array, edges: Array) -> Array:
     return 2 * np.abs(batch_means(time, signal * np.exp(phase), edges))
 
 
-def _from_batches(means: Array, widths: Array, note: str) -> Estimate:
+def _from_batches(means: FloatArray, widths: FloatArray, note: str) -> Estimate:
     """Mean of batch means and its standard uncertainty.
 
     Successive periods are correlated, so batches of one, two and three periods are tried and the largest standard error
@@ -223,28 +223,28 @@ def _from_batches(means: Array, widths: Array, note: str) -> Estimate:
     return Estimate(value, float(np.nanmax(errors)) if len(errors) > 1 else np.nan, note)
 
 
-def mean(time: Array, values: Array, window: Window) -> Estimate:
+def mean(time: FloatArray, values: FloatArray, window: Window) -> Estimate:
     """Time average over the window, (21), with the uncertainty from its scatter between shedding periods."""
     if window.edges.size < 2:
         return Estimate(np.nan, note=window.rule)
     return _from_batches(batch_means(time, values, window.edges), np.diff(window.edges), window.rule)
 
 
-def root_mean_square(time: Array, values: Array, window: Window) -> Estimate:
+def root_mean_square(time: FloatArray, values: FloatArray, window: Window) -> Estimate:
     """Root mean square about zero over the window, (23)."""
     square = mean(time, values**2, window)
     root = float(np.sqrt(square))
     return Estimate(root, square.uncertainty / (2 * root) if root > 0 else 0.0, square.note)
 
 
-def amplitude(time: Array, values: Array, window: Window) -> Estimate:
+def amplitude(time: FloatArray, values: FloatArray, window: Window) -> Estimate:
     """Amplitude of the fundamental, averaged over the shedding periods of the window."""
     if window.periods < 1:
         return Estimate(np.nan, note=window.rule)
     return _from_batches(cycle_amplitudes(time, values, window.edges), np.ones(window.periods), window.rule)
 
 
-def strouhal(time: Array, lift: Array, window: Window) -> Estimate:
+def strouhal(time: FloatArray, lift: FloatArray, window: Window) -> Estimate:
     """Strouhal number fD/U of the lift in the window.
 
     The value is the interpolated peak of the spectrum. The uncertainty joins the scatter of the zero crossings with the
@@ -260,7 +260,7 @@ def strouhal(time: Array, lift: Array, window: Window) -> Estimate:
     return Estimate(peak, float(uncertainty), note)
 
 
-def spectral_peak(time: Array, signal: Array, start: float, end: float, guess: float) -> float:
+def spectral_peak(time: FloatArray, signal: FloatArray, start: float, end: float, guess: float) -> float:
     """Return the frequency of the strongest spectral line within a factor 1.5 of `guess`.
 
     A Hann window, eightfold zero padding and a parabola through the logarithms of the three highest bins place the peak
@@ -279,7 +279,7 @@ def spectral_peak(time: Array, signal: Array, start: float, end: float, guess: f
     return float(frequency[k] + offset * frequency[1])
 
 
-def mean_profile(time: Array, profiles: Array, window: Window) -> tuple[Array, Array]:
+def mean_profile(time: FloatArray, profiles: FloatArray, window: Window) -> tuple[FloatArray, FloatArray]:
     """Time mean (22) and standard deviation in time of profiles such as C_p(t, θ).
 
     Parameters
@@ -302,7 +302,7 @@ def mean_profile(time: Array, profiles: Array, window: Window) -> tuple[Array, A
     return average, np.sqrt(np.maximum(variance, 0.0))
 
 
-def error_norms(computed: Array, exact: Array) -> dict[str, float]:
+def error_norms(computed: FloatArray, exact: FloatArray) -> dict[str, float]:
     """Relative error norms ``l1``, ``l2`` and ``max`` of a particle field, each over the same norm of the exact field.
 
     Parameters
@@ -319,7 +319,7 @@ def error_norms(computed: Array, exact: Array) -> dict[str, float]:
     return {name: float(value) for name, value in norms.items()}
 
 
-def decay_rate(time: Array, energy: Array) -> Estimate:
+def decay_rate(time: FloatArray, energy: FloatArray) -> Estimate:
     """Rate λ of an exponential decay exp(-λt), by a straight line through the logarithms (Taylor-Green: λ = 2Dνk²).
 
     Parameters

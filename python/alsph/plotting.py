@@ -1,0 +1,236 @@
+"""Figures of a run, as pure functions: results in, :class:`matplotlib.figure.Figure` out, no global state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.ndimage import binary_fill_holes
+
+from alsph import sampling
+from alsph.errors import ConfigError
+from alsph.geometry import FloatArray, Kind
+from alsph.parameters import suggest
+from alsph.reading import Snapshot
+
+if TYPE_CHECKING:
+    from alsph.analysis import Window
+    from alsph.results import PressureCoefficient, Run
+
+PIXELS_PER_SPACING = 2
+HISTORY_COLUMNS = (
+    "divergence_max divergence_mean iterations time_step velocity_max volume fluid mass_in mass_out".split()
+)
+TIME_LABEL = "$tU/D$"
+
+
+@dataclass(frozen=True)
+class FieldStyle:
+    """How a field is drawn: label with its unit, colour map, and whether the scale is symmetric about zero."""
+
+    label: str
+    colours: str
+    signed: bool
+
+
+FIELDS = {
+    "vorticity": FieldStyle(r"vorticity $\omega D/U$", "RdBu_r", True),
+    "pressure": FieldStyle(r"pressure $p\,/\,\rho U^2$", "RdBu_r", True),
+    "velocity": FieldStyle(r"velocity $|\mathbf{u}|/U$", "viridis", False),
+    "velocity_divergence": FieldStyle(r"velocity divergence $\nabla\cdot\mathbf{u}\,D/U$", "PuOr_r", True),
+}
+
+
+def field(
+    snapshot: Snapshot,
+    name: str,
+    spacing: float,
+    *,
+    limit: float | None = None,
+    view: tuple[float, float, float, float] | None = None,
+) -> Figure:
+    """Picture of a field in 2-D, the bodies in grey.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+    name : {"vorticity", "pressure", "velocity", "velocity_divergence"}
+    spacing : float
+        Particle spacing Δx [D].
+    limit : float, optional
+        End of the colour scale; from the data if None.
+    view : (left, right, bottom, top), optional
+        Part of the plane to show [D]; all of it if None.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such field, or the snapshot is in 3-D.
+    """
+    if name not in FIELDS:
+        raise ConfigError(f"unknown field '{name}'; {suggest(name, FIELDS)}")
+    if snapshot.position.shape[1] != 2:
+        raise ConfigError("pictures are drawn in 2-D only; open particles.vtkhdf in ParaView")
+    style = FIELDS[name]
+    values = np.linalg.norm(snapshot.velocity, axis=1) if name == "velocity" else getattr(snapshot, name)
+    left, right, bottom, top = extent = view or _extent(snapshot, spacing)
+    picture, body = _raster(snapshot, values, spacing, extent)
+    limit = limit or _limit(picture)
+    width = 9.0
+    figure = Figure(
+        figsize=(width, max(2.5, 0.86 * width * (top - bottom) / (right - left) + 0.9)), layout="constrained"
+    )
+    axes = figure.subplots()
+    lowest = -limit if style.signed else 0.0
+    frame: dict[str, Any] = {"extent": extent, "origin": "lower"}
+    image = axes.imshow(picture, cmap=style.colours, vmin=lowest, vmax=limit, interpolation="bilinear", **frame)
+    if body.any():
+        axes.contourf(body, levels=[0.5, np.inf], colors=["0.35"], **frame)
+    figure.colorbar(
+        image, ax=axes, label=style.label, extend="both" if style.signed else "max", pad=0.02, fraction=0.05
+    )
+    axes.set(xlabel="$x/D$", ylabel="$y/D$", title=f"{TIME_LABEL} = {snapshot.time:.2f}", aspect="equal")
+    return figure
+
+
+def _extent(snapshot: Snapshot, spacing: float) -> tuple[float, float, float, float]:
+    """Return left, right, bottom and top of the domain: the space of the fluid without the inlet and outlet buffers."""
+    position = snapshot.position[snapshot.kind == Kind.FLUID]
+    lower, upper = position.min(axis=0) - spacing / 2, position.max(axis=0) + spacing / 2
+    return float(lower[0]), float(upper[0]), float(lower[1]), float(upper[1])
+
+
+def _raster(
+    snapshot: Snapshot, values: FloatArray, spacing: float, extent: tuple[float, float, float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the fluid's field (rows, columns), NaN where there is none, and the share of each pixel that is solid."""
+    left, right, bottom, top = extent
+    columns, rows = (max(2, round(PIXELS_PER_SPACING * length / spacing)) for length in (right - left, top - bottom))
+    x = left + (np.arange(columns) + 0.5) * (right - left) / columns
+    y = bottom + (np.arange(rows) + 0.5) * (top - bottom) / rows
+    points = np.stack([grid.ravel() for grid in np.meshgrid(x, y)], axis=1)
+    fluid = snapshot.fluid
+    picture = sampling.average(snapshot.position[fluid], values[fluid], points, spacing).reshape(rows, columns)
+    if fluid.all():
+        return picture, np.zeros_like(picture)
+    body = sampling.fill(snapshot.position[~fluid], points, spacing).reshape(rows, columns)
+    hollow = binary_fill_holes(body > 0.5) & np.isnan(picture)
+    return picture, np.where(hollow, 1.0, body)
+
+
+def _limit(picture: FloatArray) -> float:
+    """Return a round end for the colour scale that all but one per cent of the pixels stay within."""
+    size = np.abs(picture[np.isfinite(picture)])
+    largest = float(np.percentile(size, 99)) if size.size else 0.0
+    if largest <= 0:
+        return 1.0
+    unit = 10.0 ** np.floor(np.log10(largest))
+    return float(np.ceil(largest / unit * 2) / 2 * unit)
+
+
+def forces(run: Run, body: str | None = None) -> Figure:
+    """Drag and lift coefficients over time with their parts, the averaging window shaded and the means drawn."""
+    figure = Figure(figsize=(9, 6), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    time = run.history["time"]
+    for axes, axis, symbol in ((upper, "x", "C_D"), (lower, "y", "C_L")):
+        parts = {part: run.coefficient(axis, part, body) for part in ("viscous", "pressure", "total")}
+        for (part, values), colour in zip(parts.items(), ("C2", "C1", "C0"), strict=True):
+            axes.plot(time, values, colour, lw=1, label=part)
+        _robust_limits(axes, time, np.stack(list(parts.values())))
+        axes.set_ylabel(f"${symbol}$")
+        _finish(axes, run.window, legend=axes is upper)
+    if run.window.edges.size and run.bodies:
+        drag, lift = run.load("x", body), run.load("y", body)
+        span = [run.window.start, run.window.end]
+        upper.plot(span, [drag.mean] * 2, "k--", lw=1)
+        upper.set_title(f"mean $C_D$ = {drag.mean}", loc="left", fontsize="medium")
+        lower.set_title(f"rms $C_L$ = {lift.rms},  Sr = {run.strouhal}", loc="left", fontsize="medium")
+    lower.set_xlabel(TIME_LABEL)
+    return figure
+
+
+def _finish(axes: Axes, window: Window, *, legend: bool = True) -> None:
+    """Shade the averaging window, and put the legend above the panel, where it hides nothing."""
+    if window.edges.size:
+        label = f"averaged ({window.periods} periods)" if window.periods else "averaged"
+        axes.axvspan(window.start, window.end, color="0.92", zorder=0, label=label)
+    axes.grid(alpha=0.3)
+    if legend:
+        axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=4, frameon=False, fontsize="small", borderpad=0)
+
+
+def _robust_limits(axes: Axes, time: FloatArray, values: FloatArray) -> None:
+    """Scale the ordinate to the record without its start, where an impulsive start's forces tower over all else."""
+    if len(time) < 10:
+        return
+    late = values[:, time > time[0] + 0.1 * (time[-1] - time[0])]
+    late = late[np.isfinite(late)]
+    if late.size and np.ptp(late) > 0:
+        margin = 0.15 * np.ptp(late)
+        axes.set_ylim(late.min() - margin, late.max() + 2 * margin)
+
+
+def pressure_coefficient(
+    coefficient: PressureCoefficient, reference: tuple[FloatArray, FloatArray] | None = None
+) -> Figure:
+    """Mean C_p over the angle from the front stagnation point, both sides folded on 0 to 180 degrees.
+
+    Parameters
+    ----------
+    coefficient : PressureCoefficient
+    reference : (theta, value), optional
+        A curve to compare with, in degrees from the front.
+    """
+    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    axes = figure.subplots()
+    theta = np.mod(coefficient.theta, 360.0)
+    for side, label, style in (
+        (theta <= 180, "upper side", "C0-"),
+        ((theta >= 180) | (theta == 0), "lower side", "C1--"),
+    ):
+        folded = np.where(theta <= 180, theta, 360 - theta)[side]
+        order = np.argsort(folded)
+        angle, mean, deviation = (a[order] for a in (folded, coefficient.mean[side], coefficient.deviation[side]))
+        axes.plot(angle, mean, style, label=label)
+        axes.fill_between(angle, mean - deviation, mean + deviation, color=style[:2], alpha=0.15, lw=0)
+    if reference is not None:
+        axes.plot(*reference, "k:", lw=1.5, label="reference")
+    if coefficient.samples == 0:
+        axes.text(0.5, 0.5, "no samples in the averaging window", ha="center", transform=axes.transAxes)
+    axes.set(xlabel=r"$\theta$ from the front stagnation point [degrees]", ylabel="$C_p$", xlim=(0, 180))
+    axes.set_title(f"mean of {coefficient.samples} samples, band: ± 1 standard deviation", fontsize="medium")
+    axes.set_xticks(range(0, 181, 30))
+    axes.grid(alpha=0.3)
+    axes.legend()
+    return figure
+
+
+def history(run: Run) -> Figure:
+    """Divergence, inner iterations, time step, largest velocity and the balance of mass over time."""
+    columns = {name: run.history.get(name, np.empty(0)) for name in HISTORY_COLUMNS}
+    start = {name: values[0] if values.size else 1.0 for name, values in columns.items()}
+    panels: dict[str, dict[str, FloatArray]] = {
+        r"$|\nabla\cdot\mathbf{u}|\,D/U$": {"largest": columns["divergence_max"], "mean": columns["divergence_mean"]},
+        "iterations": {"inner iterations of a step": columns["iterations"]},
+        r"$\Delta tU/\Delta x$": {"time step": columns["time_step"] / run.spacing},
+        "$u_{max}/U$": {"largest velocity": columns["velocity_max"]},
+        "relative change": {
+            "volume": columns["volume"] / start["volume"] - 1,
+            "fluid particles": columns["fluid"] / start["fluid"] - 1,
+            "mass in - out": (columns["mass_in"] - columns["mass_out"]) / start["volume"],
+        },
+    }
+    figure = Figure(figsize=(9, 9.5), layout="constrained")
+    for axes, (label, curves) in zip(figure.subplots(len(panels), 1, sharex=True), panels.items(), strict=True):
+        for name, values in curves.items():
+            axes.plot(run.history["time"], values, lw=0.8, label=name)
+        axes.set_ylabel(label)
+        if "nabla" in label:
+            axes.set_yscale("log")
+        _finish(axes, run.window)
+    axes.set_xlabel(TIME_LABEL)
+    return figure

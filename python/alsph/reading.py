@@ -1,0 +1,141 @@
+"""Readers of the files in a run folder; each refuses what it cannot trust with a :class:`RunFolderError`."""
+
+import json
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from alsph.errors import RunFolderError
+from alsph.geometry import FloatArray, Kind
+
+SNAPSHOT_FIELDS = ("velocity", "pressure", "velocity_divergence", "vorticity", "kind")
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """The particles at one time, in units of D and U.
+
+    Attributes
+    ----------
+    time : float
+        tU/D.
+    position, velocity : ndarray, shape (n, d)
+    pressure, velocity_divergence : ndarray, shape (n,)
+        In ρU² and U/D.
+    vorticity : ndarray, shape (n,) in 2-D, (n, 3) in 3-D
+        In U/D.
+    kind : ndarray of uint8, shape (n,)
+        See :class:`alsph.geometry.Kind`.
+    """
+
+    time: float
+    position: FloatArray
+    velocity: FloatArray
+    pressure: FloatArray
+    velocity_divergence: FloatArray
+    vorticity: FloatArray
+    kind: NDArray[np.uint8]
+
+    @property
+    def fluid(self) -> NDArray[np.bool_]:
+        """Fluid particles, those in the inlet and outlet buffers included, shape (n,)."""
+        return np.asarray(self.kind != Kind.SOLID)
+
+
+@contextmanager
+def _refusing(path: Path, *errors: type[Exception]) -> Iterator[None]:
+    try:
+        yield
+    except FileNotFoundError:
+        raise RunFolderError(f"{path.parent}: {path.name} is missing; is this a run folder of alsph?") from None
+    except errors as error:
+        raise RunFolderError(f"{path}: unreadable, truncated or being written ({error})") from None
+
+
+def case(path: Path) -> dict[str, Any]:
+    """Read ``case.toml``: the parameters by name, the ``run`` table among them."""
+    with _refusing(path, OSError, ValueError):
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    for name in ("resolution", "reynolds"):
+        if not isinstance(content.get(name), (int, float)) or not content[name] > 0:
+            raise RunFolderError(f"{path}: {name} is missing or not positive; is this a run folder of alsph?")
+    return content
+
+
+def info(path: Path) -> dict[str, Any]:
+    """Read ``run.json``."""
+    with _refusing(path, OSError, ValueError):
+        content = json.loads(path.read_text(encoding="utf-8"))
+    if not isinstance(content, dict):
+        raise RunFolderError(f"{path}: holds no table; is this a run folder of alsph?")
+    return content
+
+
+def history(path: Path) -> dict[str, FloatArray]:
+    """Read ``history.csv`` by column, without lines that are cut short; an empty ``time`` if there is no file yet."""
+    if not path.exists():
+        return {"time": np.empty(0)}
+    with _refusing(path, OSError, UnicodeDecodeError):
+        text = path.read_text(encoding="utf-8")
+    header, *lines = text[: text.rfind("\n") + 1].splitlines() or [""]
+    names = header.split(",")
+    if "time" not in names:
+        raise RunFolderError(f"{path}: no column 'time' in the first line; is this a run folder of alsph?")
+    rows = [line.replace("True", "1").replace("False", "0") for line in lines if line.count(",") == len(names) - 1]
+    with _refusing(path, ValueError):
+        table = np.loadtxt(rows, delimiter=",", ndmin=2) if rows else np.empty((0, len(names)))
+    return dict(zip(names, table.T, strict=True))
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[h5py.File]:
+    """Open an HDF5 file without a lock, so that a run that writes it is not disturbed."""
+    with _refusing(path, OSError, KeyError, ValueError, IndexError, TypeError):
+        with h5py.File(path, "r", locking=False) as file:
+            yield file
+
+
+def surface(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Read ``surface.h5``: angle (m,), time (k,) and pressure coefficient (k, m), all empty if there is no file yet."""
+    if not path.exists():
+        return np.empty(0), np.empty(0), np.empty((0, 0))
+    with _opened(path) as file:
+        angle, time, samples = (np.asarray(file[name], float) for name in ("angle", "time", "pressure_coefficient"))
+        if angle.ndim != 1 or time.ndim != 1 or samples.ndim != 2 or samples.shape[1] != len(angle):
+            raise ValueError(f"shapes {angle.shape}, {time.shape}, {samples.shape} do not match")
+    count = min(len(time), len(samples))
+    return angle, time[:count], samples[:count]
+
+
+def snapshot_times(path: Path) -> FloatArray:
+    """Read the times tU/D of the complete snapshots in ``particles.vtkhdf``, none if there is no file yet."""
+    if not path.exists():
+        return np.empty(0)
+    with _opened(path) as file:
+        steps = file["VTKHDF/Steps"]
+        return np.asarray(steps["Values"][: steps.attrs["NSteps"]], float)
+
+
+def snapshot(path: Path, step: int) -> Snapshot:
+    """Read one snapshot of ``particles.vtkhdf``."""
+    with _opened(path) as file:
+        root = file["VTKHDF"]
+        part = int(root["Steps/PartOffsets"][step])
+        first = int(root["Steps/PointOffsets"][step])
+        rows = slice(first, first + int(root["NumberOfPoints"][part]))
+        position = np.asarray(root["Points"][rows], float)
+        fields = {name: np.asarray(root["PointData"][name][rows], float) for name in SNAPSHOT_FIELDS}
+        if not len(position) == rows.stop - rows.start > 0:
+            raise ValueError(f"snapshot {step} is incomplete")
+        time = float(root["Steps/Values"][step])
+    dimensions = 3 if fields["vorticity"].ndim == 2 else 2
+    kind = fields.pop("kind").astype(np.uint8)
+    velocity = fields.pop("velocity")[:, :dimensions]
+    return Snapshot(time=time, position=position[:, :dimensions], velocity=velocity, kind=kind, **fields)

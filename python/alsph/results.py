@@ -1,0 +1,325 @@
+"""What a run folder tells: forces, Strouhal number, pressure coefficient, divergence, snapshots and figures."""
+
+import html
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from alsph import analysis, plotting, reading, sampling
+from alsph.analysis import Estimate, Window
+from alsph.errors import RunFolderError
+from alsph.geometry import FloatArray
+from alsph.reading import Snapshot
+
+
+@dataclass(frozen=True)
+class Load:
+    """A force coefficient, F / (½ρU²D), over the averaging window.
+
+    Attributes
+    ----------
+    mean, rms, amplitude : Estimate
+        Time average (21), root mean square about zero (23), and amplitude of the fundamental.
+    pressure, viscous : Estimate
+        Time averages of the two parts.
+    """
+
+    mean: Estimate
+    rms: Estimate
+    amplitude: Estimate
+    pressure: Estimate
+    viscous: Estimate
+
+
+@dataclass(frozen=True)
+class Divergence:
+    """|∇·u| of the fluid particles in U/D over the averaging window.
+
+    Attributes
+    ----------
+    mean, sum, max : Estimate
+        Time averages of the mean, the sum and the maximum over the particles. The paper's "mean velocity divergence" is
+        ``sum`` times the length of its averaging period.
+    """
+
+    mean: Estimate
+    sum: Estimate
+    max: Estimate
+
+
+@dataclass(frozen=True, eq=False)
+class PressureCoefficient:
+    """Pressure coefficient on the surface over the averaging window, relative to the mean inlet pressure.
+
+    Attributes
+    ----------
+    theta : ndarray, shape (m,)
+        Degrees from the front stagnation point.
+    mean, deviation : ndarray, shape (m,)
+        Time average (22) and standard deviation in time; NaN where there are too few samples.
+    samples : int
+        Number of samples in the window.
+    """
+
+    theta: FloatArray
+    mean: FloatArray
+    deviation: FloatArray
+    samples: int
+
+
+class Run:
+    """The results in a run folder, finished or not, read when they are first asked for.
+
+    Lengths are in D, velocities in U and times in D/U. A run that is still going on is seen as it was when each part
+    was read; make a new ``Run`` to see more of it. Where the data are too few a number is NaN and its ``note`` says
+    why.
+
+    Parameters
+    ----------
+    path : path
+        The run folder.
+
+    Raises
+    ------
+    RunFolderError
+        If it is no run folder, or a file in it is unreadable when it is needed.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        if not self.path.is_dir():
+            raise RunFolderError(f"{self.path}: no such run folder")
+        self.case: dict[str, Any] = reading.case(self.path / "case.toml")
+        self.info: dict[str, Any] = reading.info(self.path / "run.json")
+
+    @property
+    def status(self) -> str:
+        """``running``, ``finished``, ``interrupted``, ``diverged`` or ``failed``."""
+        return str(self.info.get("status", "unknown"))
+
+    @property
+    def spacing(self) -> float:
+        """Particle spacing Δx [D]."""
+        return 1.0 / float(self.case["resolution"])
+
+    @cached_property
+    def history(self) -> dict[str, FloatArray]:
+        """Columns of ``history.csv``, one entry a step; only an empty ``time`` before the first step."""
+        return reading.history(self.path / "history.csv")
+
+    @property
+    def bodies(self) -> list[str]:
+        """Names of the bodies that forces were recorded for."""
+        suffix = "_pressure_force_x"
+        return [name.removesuffix(suffix) for name in self.history if name.endswith(suffix)]
+
+    def coefficient(self, axis: str, part: str = "total", body: str | None = None) -> FloatArray:
+        """Force coefficient in every step, F / (½ρU²D).
+
+        Parameters
+        ----------
+        axis : {"x", "y", "z"}
+            Direction of the force; drag is ``x`` and lift ``y``.
+        part : {"total", "pressure", "viscous"}
+        body : str, optional
+            Name of the body; the first one if None.
+
+        Returns
+        -------
+        ndarray, shape (steps,)
+            NaN if there is no such body.
+        """
+        name = body or next(iter(self.bodies), "")
+        parts = ("pressure", "viscous") if part == "total" else (part,)
+        columns = [self.history.get(f"{name}_{each}_force_{axis}") for each in parts]
+        missing = np.full(len(self.history["time"]), np.nan)
+        return 2.0 * sum((missing if column is None else column for column in columns), np.zeros_like(missing))
+
+    @cached_property
+    def window(self) -> Window:
+        """Averaging window, found from the lift and the drag (see :func:`alsph.analysis.averaging_window`)."""
+        return analysis.averaging_window(self.history["time"], self.coefficient("x"), self.coefficient("y"))
+
+    @cached_property
+    def drag(self) -> Load:
+        """Drag coefficient of the first body."""
+        return self.load("x")
+
+    @cached_property
+    def lift(self) -> Load:
+        """Lift coefficient of the first body."""
+        return self.load("y")
+
+    def load(self, axis: str, body: str | None = None) -> Load:
+        """Force coefficient of a body along an axis over the averaging window (arguments as in :meth:`coefficient`)."""
+        total, pressure, viscous = (self.coefficient(axis, part, body) for part in ("total", "pressure", "viscous"))
+        return Load(
+            mean=self._measure(analysis.mean, total),
+            rms=self._measure(analysis.root_mean_square, total),
+            amplitude=self._measure(analysis.amplitude, total),
+            pressure=self._measure(analysis.mean, pressure),
+            viscous=self._measure(analysis.mean, viscous),
+        )
+
+    @cached_property
+    def strouhal(self) -> Estimate:
+        """Strouhal number fD/U of the lift on the first body."""
+        return self._measure(analysis.strouhal, self.coefficient("y"))
+
+    @cached_property
+    def divergence(self) -> Divergence:
+        """Velocity divergence over the averaging window."""
+        columns = (self.history.get(f"divergence_{name}", np.empty(0)) for name in ("mean", "sum", "max"))
+        return Divergence(*(self._measure(analysis.mean, column) for column in columns))
+
+    @cached_property
+    def pressure_coefficient(self) -> PressureCoefficient:
+        """Mean pressure coefficient (22) on the surface."""
+        angle, time, samples = reading.surface(self.path / "surface.h5")
+        mean, deviation = analysis.mean_profile(time, samples, self.window)
+        inside = np.count_nonzero((time >= self.window.start) & (time <= self.window.end))
+        return PressureCoefficient(angle, mean, deviation, int(inside))
+
+    def _measure(self, measure: Callable[[FloatArray, FloatArray, Window], Estimate], values: FloatArray) -> Estimate:
+        if np.isnan(values).all():
+            return Estimate(np.nan, note="no steps recorded yet" if len(values) == 0 else "no body to measure")
+        return measure(self.history["time"], values, self.window)
+
+    @cached_property
+    def times(self) -> FloatArray:
+        """Times tU/D of the snapshots, shape (k,)."""
+        return reading.snapshot_times(self.path / "particles.vtkhdf")
+
+    def snapshot(self, time: float | None = None) -> Snapshot:
+        """Particles of the snapshot nearest to a time tU/D, the last one if None.
+
+        Raises
+        ------
+        RunFolderError
+            If there is no complete snapshot.
+        """
+        if len(self.times) == 0:
+            raise RunFolderError(f"{self.path}: no snapshot yet; wait for the first one or lower output_interval")
+        index = len(self.times) - 1 if time is None else int(np.abs(self.times - time).argmin())
+        return reading.snapshot(self.path / "particles.vtkhdf", index)
+
+    def momentum_balance(self, lower: tuple[float, ...], upper: tuple[float, ...]) -> FloatArray:
+        """Mean force coefficients from the momentum balance of a box around the body: a check of the recorded loads.
+
+        Parameters
+        ----------
+        lower, upper : tuple of float
+            Corners of the box [D]; its faces must lie in the fluid.
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            Averaged over the snapshots in the averaging window; NaN if there are fewer than two.
+        """
+        times = self.times[(self.times >= self.window.start) & (self.times <= self.window.end)]
+        box = np.array(lower, dtype=float), np.array(upper, dtype=float)
+        if len(times) < 2:
+            return np.full(len(lower), np.nan)
+        balances = [self._box_balance(self.snapshot(time), box) for time in times]
+        surface, momentum = (np.array(values) for values in zip(*balances, strict=True))
+        mean = analysis.batch_means(times, surface, times[[0, -1]])[0]
+        return np.asarray(2.0 * (mean - (momentum[-1] - momentum[0]) / (times[-1] - times[0])))
+
+    def _box_balance(self, snapshot: Snapshot, box: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
+        fluid = snapshot.fluid
+        viscosity = 1.0 / float(self.case["reynolds"])
+        fields = snapshot.position[fluid], snapshot.velocity[fluid], snapshot.pressure[fluid]
+        return sampling.control_volume(*fields, box, self.spacing, 1.0, viscosity)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the run's main results by name; numbers that are measured are :class:`~alsph.analysis.Estimate`."""
+        steps = len(self.history["time"])
+        capped = 1.0 - float(self.history["converged"].mean()) if steps else np.nan
+        measured: dict[str, Any] = {"mean |∇·u| D/U": self.divergence.mean}
+        if self.bodies:
+            measured = {
+                "mean drag coefficient": self.drag.mean,
+                "mean drag coefficient, pressure": self.drag.pressure,
+                "mean drag coefficient, viscous": self.drag.viscous,
+                "rms lift coefficient": self.lift.rms,
+                "lift amplitude": self.lift.amplitude,
+                "Strouhal number": self.strouhal,
+            } | measured
+        return {
+            "case": self.case.get("case", "unknown"),
+            "status": self.status,
+            "time reached tU/D": float(self.history["time"][-1]) if steps else 0.0,
+            "steps": steps,
+            "steps ended by the iteration cap": capped,
+            "averaging window tU/D": (self.window.start, self.window.end),
+            "averaging rule": self.window.rule,
+            "shedding periods": self.window.periods,
+            **measured,
+        }
+
+    def plot_forces(self, path: str | Path | None = None, body: str | None = None) -> Figure:
+        """Figure of drag and lift over time with their parts and the averaging window; saved if `path` is given."""
+        return _saved(plotting.forces(self, body), path)
+
+    def plot_field(
+        self,
+        name: str,
+        time: float | None = None,
+        path: str | Path | None = None,
+        *,
+        limit: float | None = None,
+        view: tuple[float, float, float, float] | None = None,
+    ) -> Figure:
+        """Picture of a field; saved if `path` is given.
+
+        Parameters
+        ----------
+        name : {"vorticity", "pressure", "velocity", "velocity_divergence"}
+        time : float, optional
+            Time tU/D; the nearest snapshot is shown, the last one if None.
+        path : path, optional
+            File to save the figure in.
+        limit : float, optional
+            End of the colour scale; from the data if None.
+        view : (left, right, bottom, top), optional
+            Part of the plane to show [D]; all of it if None.
+        """
+        return _saved(plotting.field(self.snapshot(time), name, self.spacing, limit=limit, view=view), path)
+
+    def plot_pressure_coefficient(
+        self, path: str | Path | None = None, reference: tuple[FloatArray, FloatArray] | None = None
+    ) -> Figure:
+        """Figure of C_p(θ) with an optional reference curve (θ in degrees, C_p); saved if `path` is given."""
+        return _saved(plotting.pressure_coefficient(self.pressure_coefficient, reference), path)
+
+    def plot_history(self, path: str | Path | None = None) -> Figure:
+        """Figure of divergence, iterations, time step and mass over time; saved if `path` is given."""
+        return _saved(plotting.history(self), path)
+
+    def __repr__(self) -> str:
+        """Name the folder, the case, the status and the time reached."""
+        time = self.history["time"]
+        reached = time[-1] if len(time) else 0.0
+        return f"Run('{self.path}': {self.case.get('case', 'unknown')}, {self.status}, tU/D = {reached:.4g})"
+
+    def _repr_html_(self) -> str:
+        rows = ((html.escape(name), html.escape(_text(value))) for name, value in self.summary().items())
+        return "<table>" + "".join(f"<tr><th>{name}</th><td>{value}</td></tr>" for name, value in rows) + "</table>"
+
+
+def _text(value: Any) -> str:
+    """Return a summary value as a person writes it."""
+    if isinstance(value, tuple):
+        return " to ".join(f"{each:.4g}" for each in value)
+    return f"{value:.4g}" if type(value) is float else str(value)
+
+
+def _saved(figure: Figure, path: str | Path | None) -> Figure:
+    if path is not None:
+        figure.savefig(path)
+    return figure

@@ -1,0 +1,125 @@
+"""Particle fields at points, and the momentum balance of a box around a body."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from alsph.geometry import FloatArray
+
+NEIGHBOURS_PER_DIMENSION = 8
+VOID = 1.5  # points further than this many Δx from every particle have no value
+
+
+def _nearest(position: FloatArray, points: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Distances (m, k) from each point to its nearest particles, nearest first, and their indices (m, k)."""
+    count = min(NEIGHBOURS_PER_DIMENSION * points.shape[1], len(position))
+    distance, index = KDTree(position).query(points, k=[*range(1, count + 1)])
+    return distance, index
+
+
+def average(position: FloatArray, values: FloatArray, points: FloatArray, spacing: float) -> FloatArray:
+    """Gaussian means (m,) of a particle field `values` (n,) at points (m, d): smooth, for pictures.
+
+    NaN where the nearest particle is further away than 1.5 Δx.
+    """
+    distance, index = _nearest(position, points)
+    weight = np.exp(-2 * (distance / spacing) ** 2)
+    means = (weight * values[index]).sum(axis=1) / weight.sum(axis=1)
+    return np.where(distance[:, 0] < VOID * spacing, means, np.nan)
+
+
+def fill(position: FloatArray, points: FloatArray, spacing: float) -> FloatArray:
+    """Share (m,) of the space around points (m, d) that particles fill: 1 inside a body, 1/2 on its surface, 0 far off."""
+    distance, _ = _nearest(position, points)
+    width = 0.7 * spacing
+    kernel = np.exp(-0.5 * (distance / width) ** 2) / (np.sqrt(2 * np.pi) * width) ** points.shape[1]
+    return np.asarray(spacing ** points.shape[1] * kernel.sum(axis=1))
+
+
+def interpolate(
+    position: FloatArray, values: FloatArray, points: FloatArray, spacing: float
+) -> tuple[FloatArray, FloatArray]:
+    """Values and gradients of particle fields at points, by linear moving least squares over the nearest particles.
+
+    Exact for linear fields.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n, d)
+    values : ndarray, shape (n, k)
+        The k fields at the particles.
+    points : ndarray, shape (m, d)
+    spacing : float
+        Particle spacing Δx; the Gaussian weight has the standard deviation Δx.
+
+    Returns
+    -------
+    values : ndarray, shape (m, k)
+    gradients : ndarray, shape (m, k, d)
+        Derivative of field k along direction d.
+    """
+    distance, index = _nearest(position, points)
+    weight = np.exp(-0.5 * (distance / spacing) ** 2)[..., None]
+    offset = (position[index] - points[:, None]) / spacing
+    basis = np.concatenate([np.ones_like(weight), offset], axis=-1)
+    moments = np.swapaxes(basis, 1, 2) @ (weight * basis)
+    coefficients = np.linalg.pinv(moments, hermitian=True) @ (np.swapaxes(basis, 1, 2) @ (weight * values[index]))
+    return coefficients[:, 0], np.swapaxes(coefficients[:, 1:], 1, 2) / spacing
+
+
+def control_volume(
+    position: FloatArray,
+    velocity: FloatArray,
+    pressure: FloatArray,
+    box: tuple[FloatArray, FloatArray],
+    spacing: float,
+    density: float,
+    viscosity: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Surface force on the fluid in a box and its momentum, whose balance gives the force on the body inside.
+
+    The force on the body is ``surface - d(momentum)/dt``: what comes in through the faces less what stays in the fluid.
+
+    Parameters
+    ----------
+    position, velocity : ndarray, shape (n, d)
+        Fluid particles.
+    pressure : ndarray, shape (n,)
+    box : (lower, upper), two ndarrays of shape (d,)
+        Corners; the faces must lie in the fluid.
+    spacing, density, viscosity : float
+        Particle spacing Δx, density ρ and kinematic viscosity ν.
+
+    Returns
+    -------
+    surface, momentum : ndarray, shape (d,)
+    """
+    lower, upper = box
+    dimensions = len(lower)
+    fields = np.column_stack([velocity, pressure])
+    surface = np.zeros(dimensions)
+    for axis, sign, points, area in _faces(lower, upper, spacing):
+        value, gradient = interpolate(position, fields, points, spacing)
+        face_velocity, face_pressure = value[:, :dimensions], value[:, dimensions]
+        rate = gradient[:, :dimensions, :]
+        traction = density * viscosity * (rate[:, :, axis] + rate[:, axis, :])
+        traction -= density * face_velocity * face_velocity[:, [axis]]
+        traction[:, axis] -= face_pressure
+        surface += sign * area * traction.sum(axis=0)
+    centre, half = (lower + upper) / 2, (upper - lower) / 2
+    share = np.clip((half - np.abs(position - centre)) / spacing + 0.5, 0, 1).prod(axis=1)
+    return surface, density * spacing**dimensions * (share @ velocity)
+
+
+def _faces(lower: FloatArray, upper: FloatArray, spacing: float) -> Iterator[tuple[int, int, FloatArray, float]]:
+    """Yield the faces of a box: axis and sign of the outward normal, midpoints (m, d) of its tiles, area of a tile."""
+    counts = np.ceil((upper - lower) / spacing).astype(int)
+    steps = (upper - lower) / counts
+    for axis in range(len(lower)):
+        lines = [lo + step * (np.arange(n) + 0.5) for lo, step, n in zip(lower, steps, counts, strict=True)]
+        for sign, plane in ((-1, lower[axis]), (1, upper[axis])):
+            lines[axis] = np.array([plane])
+            grid = np.meshgrid(*lines, indexing="ij")
+            yield axis, sign, np.stack([g.ravel() for g in grid], axis=1), float(steps.prod() / steps[axis])

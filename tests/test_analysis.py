@@ -1,0 +1,173 @@
+import copy
+import math
+import pickle
+
+import numpy as np
+import pytest
+from alsph import analysis
+from alsph.analysis import Estimate
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from synthetic import DRAG, LIFT, STROUHAL, signals
+
+FINITE = st.floats(-1e3, 1e3)
+
+
+def uneven_times(end=60.0, step=0.01, seed=0):
+    return np.cumsum(step * np.random.default_rng(seed).uniform(0.7, 1.3, int(end / step)))
+
+
+def test_estimate_is_a_float_that_knows_its_uncertainty():
+    estimate = Estimate(1.4868, 0.0031, "how")
+    assert estimate + 1 == pytest.approx(2.4868)
+    assert f"{estimate:.2f}" == "1.49"
+    assert str(estimate) == repr(estimate) == f"{estimate}" == "1.4868 ± 0.0031"
+    assert str(Estimate(2.5)) == "2.5"
+    assert str(Estimate(math.nan, note="no data")) == "nan (no data)"
+    for twin in (copy.copy(estimate), pickle.loads(pickle.dumps(estimate))):
+        assert (twin, twin.uncertainty, twin.note) == (estimate, 0.0031, "how")
+
+
+@given(st.lists(st.floats(0.01, 1.0), min_size=4, max_size=40), FINITE, FINITE, st.data())
+def test_batch_means_are_exact_for_straight_lines(steps, offset, slope, data):
+    time = np.cumsum(steps)
+    inside = st.floats(float(time[0]), float(time[-1]))
+    edges = np.unique(data.draw(st.lists(inside, min_size=2, max_size=6)))
+    if len(edges) < 2 or np.diff(edges).min() < 1e-3:
+        return
+    means = analysis.batch_means(time, offset + slope * time, edges)
+    assert np.allclose(means, offset + slope * (edges[1:] + edges[:-1]) / 2, atol=1e-6, rtol=1e-9)
+
+
+def test_batch_means_of_profiles_act_column_by_column():
+    time = uneven_times(5.0)
+    values = np.stack([time, time**2], axis=1)
+    edges = np.array([1.0, 2.0, 4.0])
+    assert analysis.batch_means(time, values, edges) == pytest.approx(np.array([[1.5, 7 / 3], [3.0, 28 / 3]]), rel=1e-4)
+
+
+@given(st.floats(0.05, 2.0), st.floats(-3.0, 3.0), st.floats(0.0, 0.15))
+def test_upward_crossings_of_a_sine_with_noise(frequency, phase, noise):
+    time = uneven_times(20.0)
+    signal = np.sin(2 * np.pi * frequency * time + phase)
+    signal += noise * np.random.default_rng(0).uniform(-1, 1, len(time))
+    crossings = analysis.upward_crossings(time, signal, 0.3)
+    cycles = frequency * crossings + phase / (2 * np.pi)
+    assert np.allclose(cycles, np.round(cycles), atol=0.03)
+    assert abs(len(crossings) - 20 * frequency) < 2
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.floats(0.15, 0.25), st.floats(0.0, 15.0), st.floats(0.0, 0.05), st.integers(0, 99))
+def test_the_transient_is_cut_and_the_answers_are_known(strouhal, growth, noise, seed):
+    time = uneven_times()
+    drag, lift = signals(time, growth=growth, noise=noise, strouhal=strouhal, seed=seed)
+    window = analysis.averaging_window(time, drag, lift)
+    assert window.settled
+    assert growth - 3 < window.start < growth + 20
+    assert 60 - window.end < 1 / strouhal + 0.5
+    assert window.periods == round((window.end - window.start) * strouhal) >= 4
+    assert analysis.mean(time, drag, window) == pytest.approx(DRAG, rel=5e-3)
+    assert analysis.root_mean_square(time, lift, window) == pytest.approx(LIFT / math.sqrt(2), rel=1e-2)
+    assert analysis.amplitude(time, lift, window) == pytest.approx(LIFT, rel=1e-2)
+    assert analysis.strouhal(time, lift, window) == pytest.approx(strouhal, rel=3e-3)
+
+
+def test_uncertainties_cover_the_errors():
+    misses = []
+    for seed in range(40):
+        time = uneven_times(seed=seed)
+        rng = np.random.default_rng(seed)
+        drift = np.interp(time, np.arange(0, 70, 5.0), rng.normal(0, 0.01, 14))
+        drag, lift = signals(time, growth=2.0, noise=0.02, seed=seed)
+        window = analysis.averaging_window(time, drag + drift, lift * (1 + drift))
+        estimate = analysis.mean(time, drag + drift, window)
+        misses.append(abs(estimate - DRAG) / estimate.uncertainty)
+    assert np.mean(np.array(misses) < 1) > 0.5
+    assert np.mean(np.array(misses) < 3) > 0.9
+
+
+def test_shedding_that_still_grows_is_averaged_over_its_later_half_and_says_so():
+    time = uneven_times(30.0)
+    lift = np.exp(0.1 * time) * np.sin(2 * np.pi * STROUHAL * time)
+    window = analysis.averaging_window(time, np.ones_like(time), lift)
+    assert not window.settled and window.periods >= 2
+    assert "not periodic yet" in window.rule
+    assert "not periodic yet" in analysis.strouhal(time, lift, window).note
+
+
+@pytest.mark.parametrize("kind", ["zero", "noise", "constant"])
+def test_without_shedding_the_later_half_is_averaged(kind):
+    time = uneven_times(20.0)
+    lift = {"zero": 0 * time, "noise": np.random.default_rng(0).normal(size=len(time)), "constant": 1 + 0 * time}[kind]
+    window = analysis.averaging_window(time, 1.2 + 0 * time, lift)
+    assert (window.periods, window.settled) == (0, False)
+    assert window.start == pytest.approx(10.0, abs=0.1)
+    assert "no regular shedding" in window.rule
+    assert analysis.mean(time, 1.2 + 0 * time, window) == pytest.approx(1.2)
+    assert math.isnan(analysis.strouhal(time, lift, window))
+    assert math.isnan(analysis.amplitude(time, lift, window))
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_too_short_a_record_gives_nan_and_a_reason(count):
+    time = np.arange(float(count))
+    window = analysis.averaging_window(time, time, time)
+    for measure in (analysis.mean, analysis.root_mean_square, analysis.amplitude, analysis.strouhal):
+        estimate = measure(time, time, window)
+        assert math.isnan(estimate) and estimate.note
+    mean, deviation = analysis.mean_profile(time, np.zeros((count, 4)), window)
+    assert np.isnan(mean).all() and np.isnan(deviation).all()
+
+
+@settings(deadline=None)
+@given(st.integers(3, 60), st.integers(0, 1000))
+def test_any_short_record_gives_an_answer_without_failing(count, seed):
+    rng = np.random.default_rng(seed)
+    time, drag, lift = np.cumsum(rng.uniform(0.01, 1, count)), rng.normal(size=count), rng.normal(size=count)
+    window = analysis.averaging_window(time, drag, lift)
+    assert time[0] <= window.start < window.end <= time[-1]
+    for measure in (analysis.mean, analysis.root_mean_square, analysis.amplitude, analysis.strouhal):
+        assert isinstance(measure(time, lift, window), Estimate)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.floats(0.1, 0.5), st.floats(0, 6.28), st.integers(4, 20))
+def test_the_spectral_peak_is_far_finer_than_a_bin(frequency, phase, periods):
+    end = periods / frequency
+    time = np.linspace(0, end, 3000)
+    signal = np.sin(2 * np.pi * frequency * time + phase) + 0.2 * np.sin(6 * np.pi * frequency * time)
+    peak = analysis.spectral_peak(time, signal, 0.0, end, 1.1 * frequency)
+    assert abs(peak - frequency) < 0.03 / end
+
+
+def test_strouhal_gives_both_methods_and_their_difference():
+    time = uneven_times(60.0)
+    drag, lift = signals(time, growth=0.0, noise=0.01)
+    window = analysis.averaging_window(time, drag, lift)
+    strouhal = analysis.strouhal(time, lift, window)
+    assert abs(strouhal - STROUHAL) < 3 * strouhal.uncertainty < 0.003
+    assert "spectrum" in strouhal.note and "zero crossings" in strouhal.note
+
+
+def test_mean_profile_over_whole_periods():
+    time = np.arange(0.0, 60.0, 0.25)
+    shape = np.linspace(-1, 1, 7)
+    profiles = shape + np.sin(2 * np.pi * 0.2 * time)[:, None]
+    window = analysis.Window(np.arange(10.0, 60.0, 5.0), 9, True, "")
+    mean, deviation = analysis.mean_profile(time, profiles, window)
+    assert mean == pytest.approx(shape, abs=1e-3)
+    assert deviation == pytest.approx(np.full(7, math.sqrt(0.5)), rel=0.01)
+
+
+def test_error_norms_of_a_vector_field():
+    exact = np.array([[3.0, 4.0], [0.0, 5.0]])
+    norms = analysis.error_norms(exact + [[0.0, 0.1], [0.3, 0.0]], exact)
+    assert norms == pytest.approx({"l1": 0.04, "l2": math.sqrt(0.05) / 5, "max": 0.06})
+
+
+@given(st.floats(0.01, 10.0), st.floats(0.1, 10.0))
+def test_decay_rate(rate, start):
+    time = np.linspace(0, 1, 50)
+    assert analysis.decay_rate(time, start * np.exp(-rate * time)) == pytest.approx(rate)
+    assert math.isnan(analysis.decay_rate(time[:2], time[:2]))
