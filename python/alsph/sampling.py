@@ -31,7 +31,7 @@ def average(position: FloatArray, values: FloatArray, points: FloatArray, spacin
 
 
 def fill(position: FloatArray, points: FloatArray, spacing: float) -> FloatArray:
-    """Share (m,) of the space around points (m, d) that particles fill: 1 inside a body, 1/2 on its surface, 0 far off."""
+    """Share (m,) of the space at points (m, d) that particles fill: 1 inside a body, 1/2 on its surface, 0 far off."""
     distance, _ = _nearest(position, points)
     width = 0.7 * spacing
     kernel = np.exp(-0.5 * (distance / width) ** 2) / (np.sqrt(2 * np.pi) * width) ** points.shape[1]

@@ -1,0 +1,88 @@
+import sys
+
+import numpy as np
+import pytest
+from alsph import Run, plotting
+from alsph.errors import ConfigError
+from alsph.reading import Snapshot
+from alsph.results import PressureCoefficient
+from matplotlib.figure import Figure
+from synthetic import write_run
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return Run(write_run(tmp_path_factory.mktemp("runs") / "shedding", end=40.0))
+
+
+@pytest.mark.parametrize("name", plotting.FIELDS)
+def test_pictures_of_fields(run, name, tmp_path):
+    figure = run.plot_field(name, time=20, path=tmp_path / "picture.png")
+    axes, bar = figure.axes
+    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
+    assert axes.get_title() == "$tU/D$ = 20.00"
+    assert (axes.get_xlim(), axes.get_ylim()) == (pytest.approx((0, 8), abs=1e-6), pytest.approx((-4, 4)))
+    low, high = axes.images[0].get_clim()
+    assert low == (0 if name == "velocity" else -high)
+    assert bar.get_ylabel() == plotting.FIELDS[name].label
+
+
+def test_a_picture_shows_the_field_and_the_body_where_they_are(run):
+    snapshot = run.snapshot()
+    axes = run.plot_field("pressure", limit=0.7, view=(3.0, 5.0, -1.0, 1.0)).axes[0]
+    assert axes.images[0].get_clim() == (-0.7, 0.7)
+    picture = axes.images[0].get_array()
+    nearest = np.hypot(*(snapshot.position - [3.025, 0.025]).T).argmin()
+    rows, columns = picture.shape
+    assert picture[rows // 2, 0] == pytest.approx(snapshot.pressure[nearest], abs=0.02)
+    assert picture.mask[rows // 2, columns // 2] or np.isnan(picture.data[rows // 2, columns // 2])
+    outline = np.concatenate([path.vertices for path in axes.collections[0].get_paths()])
+    radius = np.hypot(*(outline[np.abs(outline).sum(axis=1) > 0] - [4.0, 0.0]).T)
+    assert radius == pytest.approx(0.5, abs=0.02)
+
+
+def test_a_picture_of_fluid_without_a_body_and_without_variation():
+    position = np.stack(np.meshgrid(np.arange(0.05, 1, 0.1), np.arange(0.05, 1, 0.1)), axis=-1).reshape(-1, 2)
+    n = len(position)
+    still = Snapshot(0.0, position, np.zeros((n, 2)), *np.zeros((3, n)), np.zeros(n, np.uint8))
+    assert plotting.field(still, "vorticity", 0.1).axes[0].images[0].get_clim() == (-1, 1)
+
+
+def test_fields_that_cannot_be_drawn(run):
+    with pytest.raises(ConfigError, match="unknown field 'vortcity'; did you mean 'vorticity'"):
+        run.plot_field("vortcity")
+    solid = Snapshot(0.0, np.zeros((1, 3)), np.zeros((1, 3)), *np.zeros((3, 1)), np.zeros(1, np.uint8))
+    with pytest.raises(ConfigError, match="2-D only"):
+        plotting.field(solid, "vorticity", 0.1)
+
+
+def test_forces_show_the_window_and_ignore_the_impulsive_start(run):
+    upper, lower = run.plot_forces().axes
+    assert upper.get_ylim()[1] < 2.5
+    assert "1.4" in upper.get_title(loc="left") and "Sr = 0.21" in lower.get_title(loc="left")
+    window = [patch for patch in upper.patches if "periods" in patch.get_label()]
+    assert window[0].get_x() == pytest.approx(run.window.start)
+
+
+def test_pressure_coefficient_with_a_reference(run):
+    reference = np.linspace(0, 180, 10), np.cos(np.linspace(0, np.pi, 10))
+    axes = run.plot_pressure_coefficient(reference=reference).axes[0]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["upper side", "lower side", "reference"]
+    upper, lower, _ = axes.lines
+    assert (upper.get_xdata()[[0, -1]] == lower.get_xdata()[[0, -1]]).all()
+
+
+def test_figures_of_a_run_that_has_just_begun(run, tmp_path):
+    for name in ("case.toml", "run.json"):
+        (tmp_path / name).write_bytes((run.path / name).read_bytes())
+    begun = Run(tmp_path)
+    for figure in (begun.plot_forces(), begun.plot_history(), begun.plot_pressure_coefficient()):
+        assert isinstance(figure, Figure)
+        figure.savefig(tmp_path / "figure.png")
+    empty = PressureCoefficient(np.array([0.0, 90.0]), np.full(2, np.nan), np.full(2, np.nan), 0)
+    plotting.pressure_coefficient(empty).savefig(tmp_path / "figure.png")
+
+
+def test_history_and_no_global_state(run, tmp_path):
+    assert len(run.plot_history(tmp_path / "history.png").axes) == 5
+    assert "matplotlib.pyplot" not in sys.modules

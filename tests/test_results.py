@@ -1,0 +1,170 @@
+import math
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+from alsph import Run, reading, sampling
+from alsph.cases import Cylinder
+from alsph.errors import RunFolderError
+from synthetic import CIRCULATION, DRAG, LIFT, STROUHAL, write_run
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return write_run(tmp_path_factory.mktemp("runs") / "shedding")
+
+
+@pytest.fixture
+def damaged(folder, tmp_path):
+    """Return a copy of the folder, to be damaged."""
+    return shutil.copytree(folder, tmp_path / "damaged")
+
+
+def test_loads_and_strouhal_number(folder):
+    run = Run(folder)
+    assert run.window.settled and run.window.periods >= 8
+    assert run.drag.mean == pytest.approx(DRAG, rel=2e-3)
+    assert run.drag.pressure == pytest.approx(0.8 * DRAG, rel=2e-3)
+    assert run.drag.viscous == pytest.approx(0.2 * DRAG, rel=2e-3)
+    assert run.lift.rms == pytest.approx(LIFT / math.sqrt(2), rel=2e-3)
+    assert run.lift.amplitude == pytest.approx(LIFT, rel=2e-3)
+    assert run.lift.mean == pytest.approx(0.0, abs=1e-3)
+    assert run.strouhal == pytest.approx(STROUHAL, rel=1e-3)
+    for estimate in (run.drag.mean, run.lift.rms, run.strouhal):
+        assert 0 < estimate.uncertainty < 0.01
+
+
+def test_divergence_and_pressure_coefficient(folder):
+    run = Run(folder)
+    assert (run.divergence.mean, run.divergence.sum, run.divergence.max) == pytest.approx((5e-4, 8, 0.5))
+    coefficient = run.pressure_coefficient
+    ideal = 1 - 2 * np.sin(np.radians(coefficient.theta)) ** 2
+    assert coefficient.mean == pytest.approx(ideal, abs=5e-3)
+    assert coefficient.deviation[18] == pytest.approx(0.1 / math.sqrt(2), rel=0.02)
+    assert coefficient.samples > 80
+
+
+def test_summary_and_representations(folder):
+    run = Run(folder)
+    summary = run.summary()
+    assert summary["status"] == "finished" and summary["steps"] == len(run.history["time"])
+    assert summary["steps ended by the iteration cap"] == pytest.approx(0.75)
+    assert repr(run).endswith("cylinder, finished, tU/D = 60.03)")
+    assert "mean drag coefficient</th><td>1.4" in run._repr_html_()
+
+
+def test_snapshots(folder):
+    run = Run(folder)
+    assert run.times == pytest.approx(np.arange(0, 61, 10.0))
+    case = Cylinder(reynolds=200, resolution=10, length=8.0, height=8.0)
+    snapshot = run.snapshot(31.0)
+    assert snapshot.time == 30.0 and run.snapshot().time == 60.0
+    assert snapshot.position == pytest.approx(case.particles()["position"], abs=1e-6)
+    assert snapshot.velocity.shape == snapshot.position.shape == (len(snapshot.kind), 2)
+    assert snapshot.fluid.sum() == (case.particles()["kind"] != 3).sum()
+
+
+def test_momentum_balance_of_potential_flow_with_circulation(folder):
+    drag, lift = Run(folder).momentum_balance((2.0, -2.0), (6.0, 2.0))
+    assert drag == pytest.approx(0.0, abs=1e-3)
+    assert lift == pytest.approx(-2 * CIRCULATION, rel=1e-3)
+
+
+def test_control_volume_takes_in_friction_and_the_change_of_momentum():
+    spacing = 0.05
+    position = np.stack(np.meshgrid(*[np.arange(-1, 1, spacing)] * 2), axis=-1).reshape(-1, 2)
+    shear = np.stack([position[:, 1] ** 2, np.zeros(len(position))], axis=1)
+    box = np.array([-0.5, -0.25]), np.array([0.5, 0.25])
+    surface, momentum = sampling.control_volume(position, shear, np.zeros(len(position)), box, spacing, 2.0, 0.1)
+    assert surface == pytest.approx([2.0 * 0.1 * 2 * 0.5, 0.0], rel=0.02, abs=1e-12)
+    assert momentum == pytest.approx([2.0 * 1.0 * 2 * 0.25**3 / 3, 0.0], rel=0.05, abs=1e-12)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_interpolation_is_exact_for_linear_fields(dimensions):
+    rng = np.random.default_rng(0)
+    position = rng.uniform(0, 1, (4000, dimensions))
+    points = rng.uniform(0.2, 0.8, (20, dimensions))
+    slope = rng.normal(size=(dimensions, 2))
+    values, gradients = sampling.interpolate(position, 1 + position @ slope, points, 4000 ** (-1 / dimensions))
+    assert values == pytest.approx(1 + points @ slope, abs=1e-9)
+    assert gradients == pytest.approx(np.broadcast_to(slope.T, gradients.shape), abs=1e-8)
+
+
+def test_a_run_that_has_just_begun_gives_nan_and_reasons(damaged):
+    for name in ("history.csv", "surface.h5", "particles.vtkhdf"):
+        (damaged / name).unlink()
+    run = Run(damaged)
+    for estimate in (run.drag.mean, run.lift.rms, run.strouhal, run.divergence.mean):
+        assert math.isnan(estimate) and "no steps" in estimate.note
+    assert run.pressure_coefficient.samples == 0 and len(run.times) == 0
+    assert np.isnan(run.momentum_balance((2, -2), (6, 2))).all()
+    assert "0 steps" in repr(run) or "tU/D = 0" in repr(run)
+    assert run.summary()["steps"] == 0 and run._repr_html_()
+    with pytest.raises(RunFolderError, match="no snapshot yet"):
+        run.snapshot()
+
+
+@pytest.mark.parametrize("kept", [0, 1, 2, 5, 300])
+def test_a_history_that_was_cut_short_is_read_up_to_the_cut(damaged, kept):
+    lines = (damaged / "history.csv").read_text().splitlines(keepends=True)
+    (damaged / "history.csv").write_text("".join(lines[: kept + 1]) + lines[kept + 1][:37])
+    run = Run(damaged)
+    assert len(run.history["time"]) == kept
+    assert isinstance(run.summary()["mean drag coefficient"], float)
+    assert math.isnan(run.strouhal) and run.strouhal.note
+
+
+def test_a_snapshot_that_was_cut_short_does_not_count(damaged):
+    with h5py.File(damaged / "particles.vtkhdf", "a") as file:
+        file["VTKHDF/Steps"].attrs["NSteps"] = 3
+    assert Run(damaged).snapshot().time == 20.0
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("case.toml", None, "case.toml is missing; is this a run folder"),
+        ("case.toml", b"resolution = ", "case.toml: unreadable"),
+        ("case.toml", b"[project]\nname = 'other'\n", "resolution is missing"),
+        ("case.toml", b"resolution = -3\nreynolds = 1\n", "resolution is missing or not positive"),
+        ("run.json", None, "run.json is missing"),
+        ("run.json", b'{"status": ', "run.json: unreadable"),
+        ("run.json", b"[]", "run.json: holds no table"),
+        ("history.csv", b"a,b\n1,2\n", "no column 'time'"),
+        ("history.csv", b"time,x\n1,two\n", "history.csv: unreadable"),
+        ("history.csv", b"\xff\xfe\n", "history.csv: unreadable"),
+        ("surface.h5", b"not HDF5", "surface.h5: unreadable"),
+        ("particles.vtkhdf", b"\x89HDF\r\n\x1a\n cut", "particles.vtkhdf: unreadable"),
+    ],
+)
+def test_damaged_and_foreign_folders_are_refused_in_one_line(damaged, name, content, message):
+    (damaged / name).unlink()
+    if content is not None:
+        (damaged / name).write_bytes(content)
+    with pytest.raises(RunFolderError, match=message) as error:
+        run = Run(damaged)
+        run.summary(), run.pressure_coefficient, run.snapshot()
+    assert "\n" not in str(error.value)
+
+
+def test_what_an_hdf5_file_says_about_itself_is_not_trusted(damaged):
+    with h5py.File(damaged / "particles.vtkhdf", "a") as file:
+        file["VTKHDF/NumberOfPoints"][:] = 10**9
+    with pytest.raises(RunFolderError, match="incomplete"):
+        Run(damaged).snapshot()
+    with h5py.File(damaged / "surface.h5", "a") as file:
+        del file["angle"]
+    with pytest.raises(RunFolderError, match="surface.h5: unreadable"):
+        _ = Run(damaged).pressure_coefficient
+    (damaged / "surface.h5").unlink()
+    with h5py.File(damaged / "surface.h5", "w") as file:
+        file["angle"], file["time"], file["pressure_coefficient"] = np.zeros(3), np.zeros(2), np.zeros((2, 4))
+    with pytest.raises(RunFolderError, match="do not match"):
+        reading.surface(damaged / "surface.h5")
+
+
+def test_a_folder_that_is_not_there():
+    with pytest.raises(RunFolderError, match="no such run folder"):
+        Run("nowhere/at-all")
