@@ -49,7 +49,7 @@ def test_summary_and_representations(folder):
     run = Run(folder)
     summary = run.summary()
     assert summary["status"] == "finished" and summary["steps"] == len(run.history["time"])
-    assert summary["steps ended by the iteration cap"] == pytest.approx(0.75)
+    assert summary["steps ended by the iteration cap, %"] == pytest.approx(75)
     assert repr(run).endswith("cylinder, finished, tU/D = 60.03)")
     assert "mean drag coefficient</th><td>1.4" in run._repr_html_()
 

@@ -16,7 +16,7 @@ from alsph.geometry import FloatArray
 
 AMPLITUDE_TOLERANCE = (0.02, 0.05)  # relative bounds on how far a settled cycle's lift amplitude is from the reference
 DRAG_TOLERANCE = (0.01, 0.02)  # and on its mean drag
-SETTLED_CYCLES = 3  # so many settled cycles in a row end the transient
+SETTLED_CYCLES = 3  # so many settled cycles in a row end the transient; fewer oscillations in all are no shedding yet
 IRREGULAR_PERIODS = 0.25  # relative scatter of the periods above which crossings are noise, not shedding
 DEAD_BAND = 0.3  # crossings are counted between excursions of at least this times the lift's rms
 BATCHES_WITHOUT_CYCLES = 5
@@ -156,7 +156,7 @@ def averaging_window(time: FloatArray, drag: FloatArray, lift: FloatArray) -> Wi
     if len(time) < 3:
         return Window(np.empty(0), 0, False, "no window: fewer than three samples")
     edges = _cycle_edges(time, lift)
-    if len(edges) < 3:
+    if len(edges) - 1 < SETTLED_CYCLES:
         halfway = 0.5 * (time[0] + time[-1])
         edges = np.linspace(halfway, time[-1], BATCHES_WITHOUT_CYCLES + 1)
         return Window(edges, 0, False, "no regular shedding found: later half of the record")
@@ -180,8 +180,6 @@ def _cycle_edges(time: FloatArray, lift: FloatArray) -> FloatArray:
 
 def _first_settled_cycle(time: FloatArray, drag: FloatArray, lift: FloatArray, edges: FloatArray) -> int | None:
     """Index of the cycle that ends the transient, None if the cycles after it do not stay settled."""
-    if len(edges) - 1 < SETTLED_CYCLES:
-        return None
     settled = _settled(cycle_amplitudes(time, lift, edges), AMPLITUDE_TOLERANCE)
     settled &= _settled(batch_means(time, drag, edges), DRAG_TOLERANCE)
     runs = np.lib.stride_tricks.sliding_window_view(settled, SETTLED_CYCLES).all(axis=1)

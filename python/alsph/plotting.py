@@ -148,7 +148,8 @@ def forces(run: Run, body: str | None = None) -> Figure:
         span = [run.window.start, run.window.end]
         upper.plot(span, [drag.mean] * 2, "k--", lw=1)
         upper.set_title(f"mean $C_D$ = {drag.mean}", loc="left", fontsize="medium")
-        lower.set_title(f"rms $C_L$ = {lift.rms},  Sr = {run.strouhal}", loc="left", fontsize="medium")
+        strouhal = "" if np.isnan(run.strouhal) else f",  Sr = {run.strouhal}"
+        lower.set_title(f"rms $C_L$ = {lift.rms}{strouhal}", loc="left", fontsize="medium")
     lower.set_xlabel(TIME_LABEL)
     return figure
 

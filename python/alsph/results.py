@@ -237,30 +237,34 @@ class Run:
         return sampling.control_volume(*fields, box, self.spacing, 1.0, viscosity)
 
     def summary(self) -> dict[str, Any]:
-        """Return the run's main results by name; numbers that are measured are :class:`~alsph.analysis.Estimate`."""
+        """Return the run's main results by name; ``str()`` of each value is fit to be read."""
         steps = len(self.history["time"])
-        capped = 1.0 - float(self.history["converged"].mean()) if steps else np.nan
-        measured: dict[str, Any] = {"mean |∇·u| D/U": self.divergence.mean}
-        if self.bodies:
-            measured = {
-                "mean drag coefficient": self.drag.mean,
-                "mean drag coefficient, pressure": self.drag.pressure,
-                "mean drag coefficient, viscous": self.drag.viscous,
-                "rms lift coefficient": self.lift.rms,
-                "lift amplitude": self.lift.amplitude,
-                "Strouhal number": self.strouhal,
-            } | measured
-        return {
+        results: dict[str, Any] = {
             "case": self.case.get("case", "unknown"),
             "status": self.status,
-            "time reached tU/D": float(self.history["time"][-1]) if steps else 0.0,
+            "time reached, tU/D": Estimate(self.history["time"][-1] if steps else 0.0),
             "steps": steps,
-            "steps ended by the iteration cap": capped,
-            "averaging window tU/D": (self.window.start, self.window.end),
+            "steps ended by the iteration cap, %": self._capped(),
+            "averaged from tU/D": Estimate(self.window.start),
+            "averaged to tU/D": Estimate(self.window.end),
             "averaging rule": self.window.rule,
             "shedding periods": self.window.periods,
-            **measured,
         }
+        if self.bodies:
+            results |= {
+                "mean drag coefficient": self.drag.mean,
+                "mean drag coefficient, pressure part": self.drag.pressure,
+                "mean drag coefficient, viscous part": self.drag.viscous,
+                "rms lift coefficient": self.lift.rms,
+                "lift coefficient amplitude": self.lift.amplitude,
+                "Strouhal number": self.strouhal,
+            }
+        return results | {"mean velocity divergence, |∇·u| D/U": self.divergence.mean}
+
+    def _capped(self) -> Estimate:
+        """Percentage of the steps that the iteration cap ended, not the tolerance."""
+        converged = self.history.get("converged", np.empty(0))
+        return Estimate(100 * (1 - converged.mean()) if converged.size else np.nan, note="no steps recorded yet")
 
     def plot_forces(self, path: str | Path | None = None, body: str | None = None) -> Figure:
         """Figure of drag and lift over time with their parts and the averaging window; saved if `path` is given."""
@@ -308,15 +312,8 @@ class Run:
         return f"Run('{self.path}': {self.case.get('case', 'unknown')}, {self.status}, tU/D = {reached:.4g})"
 
     def _repr_html_(self) -> str:
-        rows = ((html.escape(name), html.escape(_text(value))) for name, value in self.summary().items())
+        rows = ((html.escape(name), html.escape(str(value))) for name, value in self.summary().items())
         return "<table>" + "".join(f"<tr><th>{name}</th><td>{value}</td></tr>" for name, value in rows) + "</table>"
-
-
-def _text(value: Any) -> str:
-    """Return a summary value as a person writes it."""
-    if isinstance(value, tuple):
-        return " to ".join(f"{each:.4g}" for each in value)
-    return f"{value:.4g}" if type(value) is float else str(value)
 
 
 def _saved(figure: Figure, path: str | Path | None) -> Figure:
