@@ -7,7 +7,7 @@ import functools
 import inspect
 import types
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -53,7 +53,9 @@ class CaseGroup(TyperGroup):
             return super().get_command(ctx, cases.find(cmd_name).name)
 
 
-app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, help="Augmented Lagrangian SPH.")
+app = typer.Typer(
+    no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, help="Augmented Lagrangian SPH."
+)
 group_settings: dict[str, Any] = {
     "cls": CaseGroup,
     "no_args_is_help": True,
@@ -74,7 +76,7 @@ def _run(
     output: Annotated[Path | None, typer.Option("--output", "-o", help="run folder", show_default="runs/CASE")] = None,
     force: Annotated[bool, typer.Option("--force", help="replace an existing run folder")] = False,
 ) -> None:
-    _print_summary(start(configuration, output or Path("runs") / configuration.case.name, force=force))
+    _report(start(configuration, output or Path("runs") / configuration.case.name, force=force))
 
 
 def _describe(
@@ -99,25 +101,29 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
 
     first = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
     keywords = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own]
-    parameters = [first, *keywords, *_options(model), *_options(RunSettings)]
+    parameters = [
+        first,
+        *keywords,
+        *_options(model, model.parameter_names()),
+        *_options(RunSettings, RunSettings.model_fields),
+    ]
     functools.update_wrapper(command, action)
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return command
 
 
-def _options(model: type[Parameters]) -> Iterator[inspect.Parameter]:
-    """Make one option, optional, of each field of a model."""
-    for name, field in model.model_fields.items():
-        kind, choices = _option_type(field.annotation)
+def _options(model: type[Parameters], names: Iterable[str]) -> Iterator[inspect.Parameter]:
+    """Make an option of each named field of a model."""
+    for name in names:
+        kind, choices = _option_type(model.model_fields[name].annotation)
         flag = f"--{name.replace('_', '-')}"
         option = typer.Option(
             f"{flag}/--no-{flag[2:]}" if kind is bool else flag,
-            help=f"{model.describe(name)}",
-            show_default=describe_default(model, name),
+            help=f"{model.describe(name)}  [default: {describe_default(model, name)}]",
+            show_default=False,
             metavar="|".join(map(str, choices)) or None,
             parser=functools.partial(_choose, choices) if choices else None,
-            rich_help_panel=_panel(model, name),
         )
         yield inspect.Parameter(
             name,
@@ -125,14 +131,6 @@ def _options(model: type[Parameters]) -> Iterator[inspect.Parameter]:
             default=None,
             annotation=Annotated[Union[kind, None], option],  # noqa: UP007
         )
-
-
-def _panel(model: type[Parameters], name: str) -> str:
-    if model is RunSettings:
-        return "Run"
-    return (
-        "Numerical method" if name in cases.Case.model_fields and name not in ("reynolds", "resolution") else "Problem"
-    )
 
 
 def _option_type(annotation: Any) -> tuple[type, tuple[Any, ...]]:
@@ -163,7 +161,7 @@ def _resume(
     threads: Annotated[int | None, typer.Option(help="number of threads", show_default="the run's")] = None,
 ) -> None:
     """Go on with a run from its last checkpoint."""
-    _print_summary(resume(path, until, threads))
+    _report(resume(path, until, threads))
 
 
 @app.command("plot")
@@ -193,7 +191,7 @@ def _plot(
 @_exit_codes()
 def _info(path: RunPath) -> None:
     """Tell the state and the results of a run."""
-    _print_summary(Run(path))
+    _report(Run(path))
 
 
 @app.command("cases")
@@ -209,8 +207,8 @@ def _version(version: Annotated[bool, typer.Option("--version", help="print the 
         raise typer.Exit
 
 
-def _print_summary(run: Run) -> None:
-    _print_table([(name, str(value)) for name, value in run.summary().items()])
+def _report(run: Run) -> None:
+    _print_table([("run folder", str(run.path))] + [(name, str(value)) for name, value in run.summary().items()])
 
 
 def _print_table(rows: list[tuple[str, str]]) -> None:

@@ -42,7 +42,9 @@ class Config:
 
     def tables(self) -> dict[str, Any]:
         """Return the content of the configuration file; what is not set is left out."""
-        return {"case": self.case.name} | self.case.model_dump() | {"run": self.run.model_dump(exclude_none=True)}
+        run = self.run.model_dump(exclude_none=True) | {"until": self.until}
+        parameters = {name: getattr(self.case, name) for name in self.case.parameter_names()}
+        return {"case": self.case.name} | parameters | {"run": run}
 
     def save(self, path: Path) -> None:
         """Write the configuration with all its parameters to a TOML file."""

@@ -129,9 +129,9 @@ class RunFolder:
             if "time" not in file:
                 file["angle"] = angle
                 file.create_dataset(
-                    "pressure_coefficient", (0, len(angle)), maxshape=(None, len(angle)), chunks=(64, len(angle))
+                    "pressure_coefficient", (0, len(angle)), float, maxshape=(None, len(angle)), chunks=(64, len(angle))
                 )
-                file.create_dataset("time", (0,), maxshape=(None,), chunks=(64,))
+                file.create_dataset("time", (0,), float, maxshape=(None,), chunks=(64,))
             samples = len(file["time"])
             for name, value in (("pressure_coefficient", pressure_coefficient), ("time", time)):
                 file[name].resize(samples + 1, axis=0)
@@ -152,11 +152,13 @@ class RunFolder:
         self._require("checkpoint.h5")
         try:
             with h5py.File(self._file("checkpoint.h5"), "r") as file:
-                return {name: table[()] for name, table in file.items()} | {
-                    name: value.item() if isinstance(value, np.generic) else value for name, value in file.attrs.items()
-                }
-        except OSError as error:
-            raise RunFolderError(f"{self._file('checkpoint.h5')}: cannot be read: {error}") from None
+                state = {name: value.item() for name, value in file.attrs.items()}
+                state |= {name: table[()] for name, table in file.items()}
+                if not state.keys() >= {"time", "step", "position"}:
+                    raise KeyError("no time, step or position")
+                return state
+        except (OSError, KeyError) as error:
+            raise RunFolderError(f"{self._file('checkpoint.h5')}: not a checkpoint, or damaged: {error}") from None
 
     def truncate(self, step: int, time: float) -> None:
         """Drop the rows, outputs and samples that are later than a checkpoint."""

@@ -30,6 +30,16 @@ def provenance(threads: int) -> dict[str, Any]:
     }
 
 
+def describe(facts: dict[str, Any]) -> str:
+    """Return the facts of :func:`provenance` in one line, for ``run.log``."""
+    versions = ", ".join(f"{name} {number}" for name, number in facts["versions"].items())
+    machine = facts["machine"]
+    return (
+        f"{versions}, commit {facts['commit']}, {facts['threads']} threads on {machine['name']} "
+        f"({machine['processor']}, {machine['cores']} cores, {machine['system']}): {facts['command']}"
+    )
+
+
 def peak_memory() -> int | None:
     """Return the peak memory of this process [bytes], None where the system does not tell."""
     if sys.platform == "win32":

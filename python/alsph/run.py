@@ -17,7 +17,7 @@ from alsph.config import Config, RunSettings
 from alsph.errors import AlsphError, RunFolderError, SolverError
 from alsph.io import RunFolder, size_of
 from alsph.progress import Reporter, duration
-from alsph.provenance import peak_memory, provenance
+from alsph.provenance import describe, peak_memory, provenance
 from alsph.results import Run
 from alsph.simulation import SLICE_SECONDS, Simulation, next_multiple
 
@@ -91,7 +91,9 @@ class _Driver:
 
     def run(self, progress: bool) -> None:
         """Step to the end time, and leave a valid folder however the run ends."""
-        self.folder.log(f"{'resumed' if self.simulation.step else 'started'} at {self.where}: {self.provenance}")
+        self.folder.log(
+            f"{'resumed' if self.simulation.step else 'started'} at {self.where}: {describe(self.provenance)}"
+        )
         with Reporter(self.config.until, self.simulation.time, enabled=progress) as reporter:
             try:
                 with _interruptible() as interrupted:
@@ -120,7 +122,7 @@ class _Driver:
         if time >= self.next_surface:
             self.next_surface = next_multiple(time, self.config.run.surface_interval)
             self._sample_surface(rows)
-        if time >= self.next_output:
+        if time >= min(self.next_output, self.config.until):
             self.next_output = next_multiple(time, self.config.run.output_interval)
             self._output()
         elif now - self.checkpointed >= 60 * self.config.run.checkpoint_minutes:

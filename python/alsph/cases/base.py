@@ -76,6 +76,12 @@ class Case(Parameters):
         default="paper", description="pressure of solid particles: eqs. (10) and (20), or Shepard extrapolation"
     )
 
+    @classmethod
+    def parameter_names(cls) -> list[str]:
+        """Return the names of the parameters, those of the problem before those of the numerical method."""
+        numerical = Case.model_fields.keys() - {"reynolds", "resolution"}
+        return sorted(cls.model_fields, key=lambda name: name in numerical)
+
     @property
     @abstractmethod
     def space_dimensions(self) -> int:
