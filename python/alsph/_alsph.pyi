@@ -1,9 +1,11 @@
 """The compiled engine (Rust). Use it through :class:`alsph.Simulation`."""
 
-from typing import Any
+from typing import Any, Self, final
 
 import numpy as np
 from numpy.typing import NDArray
+
+__all__ = ["ConfigError", "Simulation", "SolverError", "__version__", "bytes_per_particle", "time_step_limits"]
 
 __version__: str
 
@@ -13,10 +15,11 @@ class SolverError(RuntimeError):
 class ConfigError(ValueError):
     """The settings or the arrays cannot be used; ``args[0]`` says what, where and how to mend it."""
 
+@final
 class Simulation:
     """State and stepping of one simulation in 2-D or 3-D."""
 
-    def __init__(self, settings: str, state: dict[str, Any], threads: int | None = None) -> None: ...
+    def __new__(cls, settings: str, state: dict[str, Any], threads: int | None = None) -> Self: ...
     @property
     def dimensions(self) -> int: ...
     @property
@@ -33,7 +36,7 @@ class Simulation:
         """Take up to `steps` steps, stop early after `wall_seconds`; return the steps taken."""
 
     def advance_until(self, time: float, wall_seconds: float | None = None) -> bool:
-        """Step until ``self.time >= time`` (True) or `wall_seconds` have passed (False). Δt is never clipped to `time`."""
+        """Step until ``self.time >= time`` (True) or `wall_seconds` have passed (False); Δt is never clipped."""
 
     def take_history(self) -> dict[str, NDArray[Any]]:
         """One row for each step since the last call, see docs/architecture.md for the columns."""
@@ -45,7 +48,10 @@ class Simulation:
         """All that is needed to go on from here to the last bit."""
 
     def sample(self, points: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Fluid ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d), linear moving least squares; NaN without neighbours."""
+        """Fluid ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d), by linear moving least squares.
+
+        NaN without neighbours.
+        """
 
     def inflow_position(self) -> NDArray[np.float64]:
         """Return the positions (m, d) of the inlet buffer particles."""
@@ -54,7 +60,7 @@ class Simulation:
         """Prescribe the velocity of the inlet buffer particles, (d,) or (m, d) in the order of `inflow_position`."""
 
 def time_step_limits(settings: str, velocity_max: float) -> dict[str, float]:
-    """Stable Δt: ``penalty``, ``viscous``, ``body_force`` (inf where it does not apply), and ``lambda_max`` (λ_max Δx²)."""
+    """Stable Δt: ``penalty``, ``viscous``, ``body_force`` (inf where not applicable); and ``lambda_max``, λ_max Δx²."""
 
 def bytes_per_particle(settings: str) -> float:
     """Estimate the engine's memory per particle, buffers and neighbour list included."""

@@ -1,0 +1,49 @@
+# Needs Python >= 3.11 and Rust; everything else is set up in .venv.
+
+PYTHON ?= python3
+BIN := .venv/bin
+TOOLS := .venv/.tools
+EXTENSION := python/alsph/_alsph.abi3.so
+SOURCES := Cargo.toml Cargo.lock pyproject.toml $(shell find rust -name '*.rs')
+export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
+
+.PHONY: build run test test-rust test-python bench clean
+
+build: $(EXTENSION)
+
+run: $(EXTENSION)  ## The cylinder at a coarse resolution, in about three minutes on two cores.
+	$(BIN)/alsph run cylinder --resolution 10 --until 16 --output runs/cylinder --force
+	$(BIN)/alsph plot runs/cylinder
+
+test: test-rust test-python
+
+test-rust: $(TOOLS)
+	cargo fmt --check
+	cargo clippy --all-targets -- -D warnings
+	cargo clippy --features python -- -D warnings
+	cargo test
+
+test-python: $(EXTENSION)
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/pytest
+
+bench:
+	cargo bench
+
+clean:
+	cargo clean
+	rm -rf .venv $(EXTENSION) .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+$(TOOLS): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "alsph needs Python 3.11 or later; set PYTHON=...")'
+	@command -v cargo >/dev/null || { echo "alsph needs Rust: https://rustup.rs"; exit 1; }
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(BIN)/python -m pip install --quiet --group dev
+	touch $@
+
+$(EXTENSION): $(TOOLS) $(SOURCES)
+	$(BIN)/maturin develop --release
+	touch $@
