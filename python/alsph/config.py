@@ -62,7 +62,7 @@ def from_tables(tables: dict[str, Any]) -> Config:
     parameters = dict(tables)
     name, run = parameters.pop("case", None), parameters.pop("run", {})
     if not isinstance(name, str):
-        raise ConfigError(f'case = {name!r}: name a case, for instance case = "cylinder"')
+        raise ConfigError('case: missing, or not a string; add for instance case = "cylinder"')
     if not isinstance(run, dict):
         raise ConfigError(f"run = {run!r}: must be a table, [run]")
     case = cases.find(name)(**parameters)

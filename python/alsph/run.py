@@ -5,7 +5,6 @@ import os
 import signal
 import threading
 import time as clock
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
@@ -26,14 +25,11 @@ def start(config: Config, path: Path, *, force: bool = False, progress: bool = T
     """Run a case from its start in a new run folder; see :meth:`alsph.cases.Case.run`."""
     folder = RunFolder(path)
     folder.check_new(force=force)
-    problem = config.case.build()
-    simulation = Simulation(problem, config.run.threads)
-    folder.create(config, 2 * size_of(problem.state))
-    driver = _Driver(config, folder, simulation)
+    simulation = config.case.simulation(config.run.threads)
+    folder.create(config, 2 * size_of(simulation.problem.state))
     if warning := config.case.time_step_warning():
-        warnings.warn(warning, stacklevel=3)
         folder.log(f"warning: {warning}")
-    driver.run(progress)
+    _Driver(config, folder, simulation).run(progress)
     return Run(path)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from abc import abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -167,7 +168,10 @@ class Case(Parameters):
         """
         from alsph.simulation import Simulation
 
-        return Simulation(self.build(), threads, until=self.default_until)
+        problem = self.build()
+        if warning := self.time_step_warning():
+            warnings.warn(warning, stacklevel=2)
+        return Simulation(problem, threads, until=self.default_until)
 
     def run(
         self,

@@ -1,0 +1,136 @@
+import json
+
+import numpy as np
+import pytest
+from alsph import _alsph
+from alsph.cases import CASES, Cylinder, TaylorGreen
+from alsph.errors import ConfigError
+from alsph.geometry import Kind, cylinder_rings
+
+
+def mirrored(points):
+    """Return the points mirrored about y = 0, sorted, beside the points, sorted."""
+    return sorted(map(tuple, points)), sorted(map(tuple, points * (1.0, -1.0)))
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return Cylinder().particles()
+
+
+def test_paper_channel_has_the_papers_particles(paper):
+    fluid = paper["position"][paper["kind"] == Kind.FLUID]
+    assert abs(len(fluid) - 73000) < 1000
+    assert np.hypot(fluid[:, 0] - 4, fluid[:, 1]).min() >= 0.5
+    assert fluid.min(axis=0) == pytest.approx([0.025, -6.475])
+    assert fluid.max(axis=0) == pytest.approx([13.975, 6.475])
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_arrangement_is_exactly_symmetric(paper, kind):
+    points, mirror = mirrored(paper["position"][paper["kind"] == kind])
+    assert points == mirror
+
+
+def test_buffers_continue_the_lattice(paper):
+    inlet, outlet = (paper["position"][paper["kind"] == kind] for kind in (Kind.INLET, Kind.OUTLET))
+    assert len(inlet) == len(outlet) == 8 * 260
+    assert sorted(set(np.round(inlet[:, 0], 9))) == pytest.approx(-0.025 - 0.05 * np.arange(7, -1, -1))
+    assert sorted(set(np.round(outlet[:, 0], 9))) == pytest.approx(14.025 + 0.05 * np.arange(8))
+
+
+def test_rings_have_the_spacing_of_the_lattice():
+    spacing = 0.05
+    rings = cylinder_rings(0.5, spacing, 4)
+    assert sorted(set(np.round(rings.depth, 9))) == pytest.approx([0.025, 0.075, 0.125, 0.175])
+    assert np.hypot(*rings.normal.T) == pytest.approx(1)
+    assert np.hypot(*rings.position.T) == pytest.approx(0.5 - rings.depth)
+    distance = np.linalg.norm(rings.position[:, None] - rings.position, axis=2)
+    np.fill_diagonal(distance, np.inf)
+    assert 0.9 * spacing < distance.min(axis=1).min() <= distance.min(axis=1).max() < 1.1 * spacing
+
+
+def test_rings_stop_at_the_centre():
+    assert cylinder_rings(0.5, 1 / 8, 6).depth.max() < 0.5
+
+
+def test_solid_is_as_deep_as_the_support():
+    case = Cylinder(smoothing_ratio=1.5)
+    depth = case.particles()["depth"]
+    assert depth.max() + case.particle_spacing / 2 >= 3 * 1.5 * case.particle_spacing
+
+
+def test_initial_vortex_is_divergence_free_and_can_be_left_out():
+    case, offset = Cylinder(perturbation=0.2), 1e-6
+    points = case.particles()["position"][::97]
+    velocity = case._initial_velocity
+    dudx = (velocity(points + [offset, 0]) - velocity(points - [offset, 0]))[:, 0]
+    dvdy = (velocity(points + [0, offset]) - velocity(points - [0, offset]))[:, 1]
+    assert np.abs(dudx + dvdy).max() / (2 * offset) < 1e-8
+    assert np.abs(velocity(case.particles()["position"]) - [1, 0]).max() == pytest.approx(0.2, rel=0.02)
+    still = Cylinder(perturbation=0).particles()
+    assert (still["velocity"][still["kind"] == Kind.FLUID] == [1, 0]).all()
+
+
+@pytest.mark.parametrize("model", CASES.values())
+def test_engine_accepts_the_settings_and_the_estimate_is_close(model):
+    case = model()
+    limits = _alsph.time_step_limits(json.dumps(case.settings()), 1.0)
+    assert 0.09 < limits["penalty"] / case.particle_spacing < 0.1
+    assert case.particle_estimate() == pytest.approx(len(case.particles()["kind"]), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "frame", "search"), [(1, "updated", False), (2, "initial", False), ("original", "updated", True)]
+)
+def test_algorithms(algorithm, frame, search):
+    settings = Cylinder(algorithm=algorithm).settings()
+    assert settings["derivative_frame"] == frame
+    assert settings["search_every_iteration"] is search
+
+
+def test_time_step_warning_names_the_limit():
+    assert Cylinder().time_step_warning() is None
+    assert "penalty stability limit 0.06" in Cylinder(time_step=0.08).time_step_warning()
+    assert "viscous stability limit" in Cylinder(reynolds=0.1).time_step_warning()
+    with pytest.warns(UserWarning, match="expect divergence"):
+        Cylinder(time_step=0.2, adaptive_time_step=False, resolution=8).simulation()
+
+
+def test_too_much_memory_is_refused_before_it_is_taken():
+    with pytest.raises(ConfigError, match="need .* GiB of memory"):
+        Cylinder(resolution=1_000_000).build()
+
+
+def test_exact_taylor_green_solves_the_euler_equation():
+    case = TaylorGreen(reynolds=1e30)
+    points, offset = np.random.default_rng(1).random((50, 2)), 1e-5
+
+    def derivative(name, axis):
+        step = offset * np.eye(2)[axis]
+        return (case.exact(points + step, 0)[name] - case.exact(points - step, 0)[name]) / (2 * offset)
+
+    velocity = case.exact(points, 0)["velocity"]
+    advection = velocity[:, [0]] * derivative("velocity", 0) + velocity[:, [1]] * derivative("velocity", 1)
+    gradient = np.stack([derivative("pressure", 0), derivative("pressure", 1)], axis=1)
+    assert np.abs(advection + gradient).max() < 1e-6
+    assert np.abs(derivative("velocity", 0)[:, 0] + derivative("velocity", 1)[:, 1]).max() < 1e-6
+
+
+def test_taylor_green_starts_from_the_exact_solution_and_decays():
+    case = TaylorGreen(perturbation=0.2)
+    state = case.particles()
+    exact = case.exact(state["position"], 0)
+    assert (state["velocity"] == exact["velocity"]).all()
+    assert (state["pressure"] == exact["pressure"]).all()
+    later = case.exact(state["position"], 0.3)
+    assert later["velocity"] == pytest.approx(exact["velocity"] * np.exp(-8 * np.pi**2 * 0.3 / 100))
+    with pytest.raises(ConfigError, match="2-D only"):
+        TaylorGreen(dimensions=3).exact(state["position"], 0)
+
+
+def test_taylor_green_perturbation_is_seeded():
+    first, same, other = (TaylorGreen(perturbation=0.2, seed=seed).particles()["position"] for seed in (1, 1, 2))
+    assert (first == same).all()
+    assert (first != other).any()
+    assert np.abs(first - TaylorGreen().particles()["position"]).max() <= 0.2 / 50 + 1e-12

@@ -1,0 +1,138 @@
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from alsph import config, open_run
+from alsph.cases import CASES
+
+COMMAND = [sys.executable, "-c", "from alsph.cli import main; main()"]
+
+
+def test_end_to_end(alsph, tmp_path, small_options):
+    run = tmp_path / "run"
+    options = ["--reynolds", 150, "--max-iterations=2", "--threads=2", "--until=0.2", "--output-interval=0.1"]
+    code, stdout, _ = alsph("run", "cylinder", *small_options, *options, "-o", run)
+    assert code == 0
+    assert "mean drag coefficient" in stdout
+    resolved = config.load(run / "case.toml")
+    assert (resolved.case.reynolds, resolved.case.max_iterations, resolved.run.threads) == (150, 2, 2)
+    assert open_run(run).history["iterations"].max() == 2
+
+    code, stdout, _ = alsph("info", run)
+    assert code == 0
+    assert "finished" in stdout
+
+    code, stdout, _ = alsph("plot", run, "--time", 0.1)
+    assert code == 0
+    for name in ("forces", "pressure_coefficient", "history", "vorticity", "pressure"):
+        assert str(run / "figures" / f"{name}.png") in stdout
+        assert (run / "figures" / f"{name}.png").stat().st_size > 1000
+
+    code, _, stderr = alsph("run", "cylinder", *small_options, "-o", run)
+    assert (code, "exists already" in stderr) == (2, True)
+    assert alsph("resume", run, "--until", 0.25)[0] == 0
+    assert open_run(run).history["time"][-1] >= 0.25
+    assert alsph("run", "cylinder", *small_options, "--until=0.02", "--force", "-o", run)[0] == 0
+    assert open_run(run).history["time"][-1] < 0.04
+
+
+def test_configuration_file_with_options_on_top(alsph, tmp_path):
+    path = tmp_path / "my.toml"
+    path.write_text('case = "taylor_green"\nresolution = 12\nseed = 3\n[run]\nuntil = 0.05\nthreads = 1\n')
+    assert (
+        alsph("run", path, "--resolution", 10, "--algorithm", 1, "--no-adaptive-time-step", "-o", tmp_path / "run")[0]
+        == 0
+    )
+    resolved = config.load(tmp_path / "run" / "case.toml")
+    assert (resolved.case.resolution, resolved.case.seed, resolved.case.algorithm) == (10, 3, 1)
+    assert resolved.case.adaptive_time_step is False
+    assert (resolved.run.until, resolved.run.threads) == (0.05, 1)
+    assert alsph("run", tmp_path / "run" / "case.toml", "-o", tmp_path / "again")[0] == 0
+    histories = [(tmp_path / name / "history.csv").read_text() for name in ("run", "again")]
+    assert histories[0] == histories[1]
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("command", ["run", "describe"])
+def test_help_teaches_every_parameter(alsph, case, command):
+    code, stdout, _ = alsph(command, case, "--help")
+    assert code == 0
+    words = " ".join(stdout.split())
+    for name, field in CASES[case].model_fields.items():
+        assert f"--{name.replace('_', '-')} " in words
+        assert field.description in words
+    assert "--until" in words
+
+
+def test_describe(alsph, small_options):
+    code, stdout, _ = alsph("describe", "cylinder", *small_options, "--until", 2)
+    assert code == 0
+    for text in ("fluid", "solid", "MiB", "penalty limit", "(binds)", "viscous limit", "Reynolds number", "to t* = 2"):
+        assert text in stdout
+    assert "s a step" in stdout
+    code, stdout, _ = alsph("describe", "cylinder", "--time-step=0.1", "--no-probe")
+    assert "estimated time" not in stdout
+    assert "lies above the penalty stability limit" in stdout
+
+
+def test_cases_and_version(alsph):
+    code, stdout, _ = alsph("cases")
+    assert (code, all(name in stdout for name in CASES)) == (0, True)
+    assert alsph("--version")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "cilinder"], "unknown case 'cilinder'; did you mean 'cylinder'?"),
+        (["run", "missing.toml"], "missing.toml: cannot be read"),
+        (["run", "cylinder", "--resolution", "4"], "resolution = 4: too coarse"),
+        (["run", "cylinder", "--reynolds", "nan"], "reynolds = nan: must be a finite number"),
+        (["run", "cylinder", "--reynolds", "much"], "Invalid value for '--reynolds'"),
+        (["run", "cylinder", "--algorithm", "3"], "algorithm = '3': must be 1, 2 or 'original'"),
+        (["run", "cylinder", "--threads", "0"], "run.threads = 0: must be greater than or equal to 1"),
+        (["run", "cylinder", "--bogus", "1"], "No such option"),
+        (["describe", "cylinder", "--resolution", "100000"], "GiB of memory"),
+        (["info", "missing"], "missing"),
+        (["plot", "missing"], "missing"),
+        (["resume", "missing"], "missing"),
+    ],
+)
+def test_mistakes(alsph, tmp_path, monkeypatch, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    code, _, stderr = alsph(*arguments)
+    assert code == 2
+    assert message in stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.filterwarnings("ignore:.*expect divergence")
+def test_divergence_is_exit_code_1(alsph, tmp_path, small_options):
+    options = ["--time-step=0.3", "--no-adaptive-time-step", "--until=20"]
+    code, _, stderr = alsph("run", "cylinder", *small_options, *options, "-o", tmp_path / "run")
+    assert code == 1
+    assert "last good state" in stderr
+    assert "Traceback" not in stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_run_can_be_resumed(alsph, tmp_path, small_options, number):
+    run = tmp_path / "run"
+    arguments = ["run", "cylinder", *small_options, "--until=1000", "-o", str(run)]
+    process = subprocess.Popen([*COMMAND, *arguments], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+    while not (run / "checkpoint.h5").exists():
+        time.sleep(0.05)
+        assert process.poll() is None
+    time.sleep(0.5)
+    process.send_signal(number)
+    _, stderr = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert f"go on with: alsph resume {run}" in stderr
+    interrupted = open_run(run)
+    assert interrupted.status == "interrupted"
+    end = interrupted.history["time"][-1]
+    assert end > 0
+    assert alsph("resume", run, "--until", end + 0.05)[0] == 0
+    assert open_run(run).status == "finished"

@@ -1,0 +1,250 @@
+import json
+import os
+import shutil
+import threading
+
+import alsph
+import h5py
+import numpy as np
+import pytest
+from alsph import config, io
+from alsph.cases import Cylinder, TaylorGreen
+from alsph.errors import ConfigError, RunFolderError, SolverError
+from alsph.run import resume, start
+
+HISTORY_COLUMNS = (
+    "step time time_step iterations converged divergence_max divergence_mean divergence_sum velocity_max "
+    "penalty_coefficient volume kinetic_energy mass_in mass_out inlet_pressure fluid inlet outlet solid "
+    "drag_coefficient drag_pressure drag_viscous lift_coefficient lift_pressure lift_viscous "
+    "cylinder_pressure_force_x cylinder_pressure_force_y cylinder_viscous_force_x cylinder_viscous_force_y "
+    "cylinder_pressure_torque cylinder_viscous_torque"
+).split()
+
+
+def same(first, second):
+    """Return whether two sets of arrays are the same to the last bit, NaN included."""
+    return first.keys() == second.keys() and all(np.array_equal(first[k], second[k], equal_nan=True) for k in first)
+
+
+def by_id(state):
+    """Return the arrays of a state in the order of the particles' numbers."""
+    order = np.argsort(state["id"])
+    return {name: value[order] if np.ndim(value) else value for name, value in state.items()}
+
+
+def test_run_folder(small, tmp_path):
+    run = small.run(tmp_path / "run", until=0.25, threads=2, output_interval=0.1, progress=False)
+    files = {path.name for path in run.path.iterdir()}
+    names = "case.toml run.json history.csv particles.vtkhdf surface.h5 checkpoint.h5 run.log"
+    assert files == set(names.split())
+    assert config.load(run.path / "case.toml").case == small
+
+    info = json.loads((run.path / "run.json").read_text())
+    assert info["status"] == "finished"
+    assert info["threads"] == 2
+    assert info["time"] >= 0.25
+    assert info["versions"]["alsph"] == alsph.__version__
+    assert info["peak_memory_bytes"] > 1e6
+    assert {"commit", "machine", "seconds", "particles", "step", "case"} <= info.keys()
+
+    assert set(run.history) == set(HISTORY_COLUMNS)
+    assert run.history["step"].tolist() == list(range(1, info["step"] + 1))
+    drag = 2 * (run.history["cylinder_pressure_force_x"] + run.history["cylinder_viscous_force_x"])
+    assert run.history["drag_coefficient"] == pytest.approx(drag)
+    assert run.history["drag_coefficient"] == pytest.approx(run.history["drag_pressure"] + run.history["drag_viscous"])
+
+    step = run.history["time_step"].max()
+    assert run.times == pytest.approx([0, 0.1, 0.2, 0.25], abs=1.01 * step)
+    with h5py.File(run.path / "surface.h5") as file:
+        assert file["time"][:] == pytest.approx([0.1, 0.2], abs=1.01 * step)
+        assert file["pressure_coefficient"].shape == (2, 72)
+        assert np.isfinite(file["pressure_coefficient"][:]).all()
+    assert f"alsph {alsph.__version__}" in (run.path / "run.log").read_text().splitlines()[0]
+
+
+def test_run_without_a_body(tmp_path):
+    run = TaylorGreen(resolution=10).run(tmp_path / "run", until=0.05, progress=False)
+    assert not (run.path / "surface.h5").exists()
+    assert "drag_coefficient" not in run.history
+
+
+def test_resumed_run_is_the_uninterrupted_run_to_the_last_bit(small, tmp_path):
+    whole = small.run(tmp_path / "whole", until=0.2, output_interval=0.1, progress=False)
+    part = small.run(tmp_path / "part", until=0.1, output_interval=0.1, progress=False)
+    with pytest.raises(RunFolderError, match="has reached its end"):
+        resume(part.path, progress=False)
+    part = resume(part.path, until=0.2, threads=1, progress=False)
+    assert (part.path / "history.csv").read_text() == (whole.path / "history.csv").read_text()
+    assert same(*(by_id(io.RunFolder(run.path).read_checkpoint()) for run in (whole, part)))
+    assert part.times.tolist() == whole.times.tolist()
+    assert config.load(part.path / "case.toml").run.until == 0.2
+
+
+def test_what_is_later_than_the_checkpoint_is_done_again(small, tmp_path):
+    run = small.run(tmp_path / "run", until=0.1, progress=False)
+    checkpoint = (run.path / "checkpoint.h5").read_bytes()
+    resume(run.path, until=0.2, progress=False)
+    history = (run.path / "history.csv").read_text()
+    (run.path / "checkpoint.h5").write_bytes(checkpoint)
+    again = resume(run.path, until=0.2, progress=False)
+    assert (run.path / "history.csv").read_text() == history
+    assert len(again.times) == 3
+
+
+@pytest.mark.filterwarnings("ignore:.*expect divergence")
+def test_diverged_run_keeps_the_last_good_state(small, tmp_path):
+    case = Cylinder(**small.model_dump() | {"time_step": 0.3, "adaptive_time_step": False})
+    with pytest.raises(SolverError, match=r"step \d+.*last good state, t\* = .*checkpoint.h5"):
+        case.run(tmp_path / "run", until=20, progress=False)
+    info = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert info["status"] == "diverged"
+    assert "last good state" in info["message"]
+    assert np.isfinite(io.RunFolder(tmp_path / "run").read_checkpoint()["velocity"]).all()
+    assert "warning: time_step = 0.3" in (tmp_path / "run" / "run.log").read_text()
+    assert alsph.open_run(tmp_path / "run").status == "diverged"
+
+
+def test_disk_that_fills_up_leaves_a_folder_that_resumes(small, tmp_path, monkeypatch):
+    usage, append = shutil.disk_usage(tmp_path), io.RunFolder.append_surface
+
+    def fill(self, *arguments):
+        monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=10))
+        append(self, *arguments)
+
+    monkeypatch.setattr(io.RunFolder, "append_surface", fill)
+    with pytest.raises(RunFolderError, match="disk full"):
+        small.run(tmp_path / "run", until=0.2, progress=False)
+    monkeypatch.undo()
+    info = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert (info["status"], "disk full" in info["message"]) == ("failed", True)
+    assert resume(tmp_path / "run", progress=False).status == "finished"
+
+
+def test_nothing_is_created_for_a_run_that_cannot_start(small, tmp_path):
+    with pytest.raises(ConfigError, match="GiB of memory"):
+        Cylinder(resolution=10**6).run(tmp_path / "run", progress=False)
+    with pytest.raises(ConfigError, match="threads = 0"):
+        small.run(tmp_path / "run", threads=0, progress=False)
+    with pytest.raises(RunFolderError, match="not a folder that can be written to"):
+        small.run("/proc/version/run", progress=False)
+    assert not list(tmp_path.iterdir())
+
+
+def test_existing_folder_is_replaced_only_by_force(small, tmp_path):
+    small.run(tmp_path / "run", until=0.05, progress=False)
+    with pytest.raises(RunFolderError, match="exists already"):
+        small.run(tmp_path / "run", until=0.05, progress=False)
+    run = small.run(tmp_path / "run", until=0.02, force=True, progress=False)
+    assert run.history["time"][-1] < 0.04
+
+
+def test_a_run_that_is_going_on_is_left_alone(small, tmp_path):
+    folder = io.RunFolder(small.run(tmp_path / "run", until=0.05, progress=False).path)
+    folder.write_info(folder.info() | {"status": "running", "pid": os.getppid()})
+    with pytest.raises(RunFolderError, match="is still running it"):
+        resume(folder.path, until=0.1)
+    folder.write_info(folder.info() | {"pid": 2**22 + 1})
+    assert resume(folder.path, until=0.06, progress=False).status == "finished"
+
+
+def test_run_in_a_thread(small, tmp_path):
+    settings = config.Config(small, config.RunSettings(until=0.05))
+    worker = threading.Thread(target=start, args=(settings, tmp_path / "run"), kwargs={"progress": False})
+    worker.start()
+    worker.join()
+    assert alsph.open_run(tmp_path / "run").status == "finished"
+
+
+def test_plain_progress(small, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("alsph.progress.PLAIN_SECONDS", 0.0)
+    small.run(tmp_path / "run", until=0.1)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines
+    for text in ("%", "steps/s", "ETA", "t* ", "5 iterations (cap)", "max|∇·u|", "C_D", "C_L", "particles"):
+        assert text in lines[0]
+
+
+def test_stepping(small):
+    simulation = small.simulation(threads=2)
+    assert simulation.history() == {}
+    assert simulation.advance(3) == 3
+    assert simulation.run_until(0.05)
+    assert simulation.time >= 0.05
+    assert not simulation.run_until(100, wall_seconds=0.05)
+    history = simulation.history()
+    assert history["step"].tolist() == list(range(1, simulation.step + 1))
+    assert simulation.history()["time"][-1] == simulation.time
+    particles = simulation.snapshot()
+    assert len(particles["position"]) == sum(simulation.counts.values())
+    assert particles["vorticity"].shape == particles["pressure"].shape
+
+
+def test_steps_are_evenly_spaced(small):
+    times = [0.1, 0.2, 0.25]
+    simulation = small.simulation()
+    for state in simulation.steps(every=0.1, until=0.25):
+        assert simulation.time == pytest.approx(times.pop(0), abs=0.0064)
+        assert state["velocity"].shape[1] == 2
+    assert not times
+    assert simulation.until == small.default_until
+
+
+def test_going_back_gives_the_same_steps(small):
+    simulation = small.simulation()
+    simulation.advance(3)
+    state = simulation.state()
+    simulation.advance(4)
+    first, history = simulation.snapshot(), simulation.history()
+    simulation.restore(state)
+    assert simulation.step == 3
+    simulation.advance(4)
+    assert same(first, simulation.snapshot())
+    assert same({name: column[3:] for name, column in history.items()}, simulation.history())
+
+
+def test_one_thread_is_two_threads_to_the_last_bit(small):
+    one, two = (small.simulation(threads=threads) for threads in (1, 2))
+    for simulation in (one, two):
+        simulation.advance(10)
+    assert same(one.snapshot(), two.snapshot())
+    assert same(one.history(), two.history())
+
+
+def test_prescribed_inflow(small):
+    calls = []
+
+    def inflow(position, time):
+        calls.append(time)
+        assert position.shape == (simulation.counts["inlet"], 2)
+        return np.stack([1 + 0.1 * np.cos(position[:, 1]), 0 * position[:, 0]], axis=1)
+
+    simulation = small.simulation()
+    simulation.set_inflow(inflow)
+    simulation.advance(3)
+    simulation.run_until(0.05)
+    assert len(calls) == simulation.step
+    state = simulation.snapshot()
+    inlet = state["kind"] == 1
+    assert state["velocity"][inlet, 0] == pytest.approx(1 + 0.1 * np.cos(state["position"][inlet, 1]), abs=1e-9)
+
+    simulation.set_inflow([0.5, 0.0])
+    simulation.advance(2)
+    state = simulation.snapshot()
+    assert (state["velocity"][state["kind"] == 1] == [0.5, 0.0]).all()
+    with pytest.raises(ConfigError, match="inflow velocity"):
+        simulation.set_inflow(np.zeros((3, 2)))
+
+
+def test_symmetric_flow_has_no_lift(small):
+    simulation = Cylinder(**small.model_dump() | {"perturbation": 0.0}).simulation()
+    simulation.advance(30)
+    history = simulation.history()
+    assert np.abs(history["lift_coefficient"]).max() < 1e-9
+    assert history["drag_coefficient"][-1] > 0.5
+
+
+def test_sample_is_the_uniform_flow_far_from_the_body(small):
+    simulation = small.simulation()
+    sample = simulation.sample(np.array([[0.3, 1.5], [100.0, 0.0]]))
+    assert sample["velocity"][0] == pytest.approx([1, 0], abs=0.01)
+    assert np.isnan(sample["pressure"][1])
