@@ -4,8 +4,10 @@ import time as clock
 from types import TracebackType
 from typing import Any, Self
 
-from rich.console import Console
+from rich.console import Console, Group
+from rich.live import Live
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
 PLAIN_SECONDS = 10.0
 
@@ -24,36 +26,31 @@ class Reporter:
     """
 
     def __init__(self, until: float, time: float, *, enabled: bool = True) -> None:
-        self._until, self._first_time = until, time
-        self._enabled = enabled
-        self._console = Console(highlight=False, soft_wrap=True)
-        self._bar: Progress | None = None
-        if self._console.is_terminal or self._console.is_jupyter:
-            columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[rate]}  ETA"), TimeRemainingColumn())
-            self._bar = Progress(
-                *columns, TextColumn("\n{task.fields[physics]}"), console=self._console, disable=not enabled
-            )
-            self._task = self._bar.add_task("", total=until, rate="", physics="")
+        self._until, self._first_time, self._enabled = until, time, enabled
+        console = Console(highlight=False, soft_wrap=True)
+        self._console = console
+        self._live: Live | None = None
+        if enabled and (console.is_terminal or console.is_jupyter):
+            rate = TextColumn("{task.description}  ETA")
+            self._bar = Progress(BarColumn(), TaskProgressColumn(), rate, TimeRemainingColumn(), console=console)
+            self._task = self._bar.add_task("", total=until)
+            self._bar.update(self._task, completed=time)
+            self._live = Live(self._bar, console=console)
         self._start = self._last_line = clock.monotonic()
         self._steps = 0
 
     def __enter__(self) -> Self:
         """Show the bar."""
-        if self._bar:
-            self._bar.start()
+        if self._live:
+            self._live.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Stop the bar."""
-        if self._bar:
-            self._bar.stop()
-
-    def message(self, text: str) -> None:
-        """Print a line."""
-        if self._enabled:
-            self._console.print(text, markup=False)
+        if self._live:
+            self._live.stop()
 
     def update(self, rows: dict[str, Any]) -> None:
         """Report new rows of the history."""
@@ -63,13 +60,15 @@ class Reporter:
         self._steps += len(rows["step"])
         time, seconds = float(rows["time"][-1]), now - self._start
         rate = f"{self._steps / seconds:.1f} steps/s" if seconds > 0 else ""
-        if self._bar:
-            self._bar.update(self._task, completed=min(time, self._until), rate=rate, physics=physics_line(rows))
+        if self._live:
+            self._bar.update(self._task, completed=min(time, self._until), description=rate)
+            self._live.update(Group(self._bar, Text(physics_line(rows))))
         elif now - self._last_line >= PLAIN_SECONDS:
             self._last_line = now
             done = (time - self._first_time) / (self._until - self._first_time)
-            left = seconds * (1 / done - 1) if done > 0 else float("inf")
-            self.message(f"{100 * time / self._until:5.1f} %  {rate}  ETA {duration(left)}  {physics_line(rows)}")
+            left = duration(seconds * (1 / done - 1)) if done > 0 else "?"
+            line = f"{100 * time / self._until:5.1f} %  {rate}  ETA {left}  {physics_line(rows)}"
+            self._console.print(line, markup=False)
 
 
 def physics_line(rows: dict[str, Any]) -> str:
@@ -88,8 +87,6 @@ def physics_line(rows: dict[str, Any]) -> str:
 
 def duration(seconds: float) -> str:
     """Return a length of time in words."""
-    if seconds == float("inf"):
-        return "?"
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"
