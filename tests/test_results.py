@@ -82,14 +82,14 @@ def test_control_volume_takes_in_friction_and_the_change_of_momentum():
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])
-def test_interpolation_is_exact_for_linear_fields(dimensions):
+def test_interpolation_is_exact_for_quadratic_fields(dimensions):
     rng = np.random.default_rng(0)
     position = rng.uniform(0, 1, (4000, dimensions))
     points = rng.uniform(0.2, 0.8, (20, dimensions))
     slope = rng.normal(size=(dimensions, 2))
-    values, gradients = sampling.interpolate(position, 1 + position @ slope, points, 4000 ** (-1 / dimensions))
-    assert values == pytest.approx(1 + points @ slope, abs=1e-9)
-    assert gradients == pytest.approx(np.broadcast_to(slope.T, gradients.shape), abs=1e-8)
+    values, gradients = sampling.interpolate(position, (position @ slope) ** 2, points, 4000 ** (-1 / dimensions))
+    assert values == pytest.approx((points @ slope) ** 2, abs=1e-9)
+    assert gradients == pytest.approx((2 * points @ slope)[:, :, None] * slope.T, abs=1e-7)
 
 
 def test_a_run_that_has_just_begun_gives_nan_and_reasons(damaged):

@@ -249,7 +249,7 @@ def strouhal(time: FloatArray, lift: FloatArray, window: Window) -> Estimate:
     difference between the two methods. The note gives both.
     """
     if window.periods < 2:
-        return Estimate(np.nan, note=f"{window.rule} ({window.periods} whole shedding periods)")
+        return Estimate(np.nan, note=window.rule)
     fit = linregress(np.arange(window.periods + 1), window.edges)
     crossing = 1 / float(fit.slope)
     peak = spectral_peak(time, lift, window.start, window.end, crossing)

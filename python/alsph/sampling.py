@@ -41,9 +41,9 @@ def fill(position: FloatArray, points: FloatArray, spacing: float) -> FloatArray
 def interpolate(
     position: FloatArray, values: FloatArray, points: FloatArray, spacing: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Values and gradients of particle fields at points, by linear moving least squares over the nearest particles.
+    """Values and gradients of particle fields at points, by quadratic moving least squares over the nearest particles.
 
-    Exact for linear fields.
+    Exact for quadratic fields.
 
     Parameters
     ----------
@@ -63,10 +63,11 @@ def interpolate(
     distance, index = _nearest(position, points)
     weight = np.exp(-0.5 * (distance / spacing) ** 2)[..., None]
     offset = (position[index] - points[:, None]) / spacing
-    basis = np.concatenate([np.ones_like(weight), offset], axis=-1)
+    first, second = np.triu_indices(points.shape[1])
+    basis = np.concatenate([np.ones_like(weight), offset, offset[..., first] * offset[..., second]], axis=-1)
     moments = np.swapaxes(basis, 1, 2) @ (weight * basis)
     coefficients = np.linalg.pinv(moments, hermitian=True) @ (np.swapaxes(basis, 1, 2) @ (weight * values[index]))
-    return coefficients[:, 0], np.swapaxes(coefficients[:, 1:], 1, 2) / spacing
+    return coefficients[:, 0], np.swapaxes(coefficients[:, 1 : points.shape[1] + 1], 1, 2) / spacing
 
 
 def control_volume(
