@@ -12,7 +12,7 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 build: $(EXTENSION)
 
 run: $(EXTENSION)  ## The cylinder at a coarse resolution, in about three minutes on two cores.
-	$(BIN)/alsph run cylinder --resolution 10 --until 16 --output runs/cylinder --force
+	$(BIN)/alsph run cylinder --resolution 10 --until 20 --output runs/cylinder --force
 	$(BIN)/alsph plot runs/cylinder
 
 test: test-rust test-python

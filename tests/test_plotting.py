@@ -21,7 +21,7 @@ def test_pictures_of_fields(run, name, tmp_path):
     axes, bar = figure.axes
     assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
     assert axes.get_title() == "$tU/D$ = 20.00"
-    assert (axes.get_xlim(), axes.get_ylim()) == (pytest.approx((0, 8), abs=1e-6), pytest.approx((-4, 4)))
+    assert (axes.get_xlim(), axes.get_ylim()) == (pytest.approx((0, 8)), pytest.approx((-4, 4)))
     low, high = axes.images[0].get_clim()
     assert low == (0 if name == "velocity" else -high)
     assert bar.get_ylabel() == plotting.FIELDS[name].label

@@ -99,8 +99,9 @@ def field(
 def _extent(snapshot: Snapshot, spacing: float) -> tuple[float, float, float, float]:
     """Return left, right, bottom and top of the domain: the space of the fluid without the inlet and outlet buffers."""
     position = snapshot.position[snapshot.kind == Kind.FLUID]
-    lower, upper = position.min(axis=0) - spacing / 2, position.max(axis=0) + spacing / 2
-    return float(lower[0]), float(upper[0]), float(lower[1]), float(upper[1])
+    bounds = np.array([position.min(axis=0) - spacing / 2, position.max(axis=0) + spacing / 2])
+    (left, bottom), (right, top) = np.round(bounds / spacing) * spacing
+    return float(left), float(right), float(bottom), float(top)
 
 
 def _raster(
@@ -232,6 +233,8 @@ def history(run: Run) -> Figure:
         axes.set_ylabel(label)
         if "nabla" in label:
             axes.set_yscale("log")
+        elif "change" not in label:
+            axes.set_ylim(bottom=0)
         _finish(axes, run.window)
     axes.set_xlabel(TIME_LABEL)
     return figure
