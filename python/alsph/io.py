@@ -1,7 +1,7 @@
 """The run folder, as it is written: see docs/architecture.md for its files.
 
 Every file is opened, appended to and closed, or written under a temporary name and renamed, so that a run that is cut
-leaves a folder that can be read and resumed.
+leaves a folder that can be read and resumed. Files are not locked, so that a viewer that has one open stops no run.
 """
 
 import csv
@@ -125,7 +125,7 @@ class RunFolder:
     def append_surface(self, time: float, angle: FloatArray, pressure_coefficient: FloatArray) -> None:
         """Append a sample of the pressure coefficient (m,) at the angles (m,) [degrees] to ``surface.h5``."""
         self._make_room(pressure_coefficient.nbytes)
-        with self._writing(), h5py.File(self._file("surface.h5"), "a") as file:
+        with self._writing(), h5py.File(self._file("surface.h5"), "a", locking=False) as file:
             if "time" not in file:
                 file["angle"] = angle
                 file.create_dataset(
@@ -163,25 +163,25 @@ class RunFolder:
     def truncate(self, step: int, time: float) -> None:
         """Drop the rows, outputs and samples that are later than a checkpoint."""
         with self._writing():
-            if self._file("history.csv").exists():
+            if self._file("history.csv").exists() and self._file("history.csv").stat().st_size:
                 self._truncate_history(step)
             if self._file("particles.vtkhdf").exists():
                 vtkhdf.truncate(self._file("particles.vtkhdf"), time)
             if self._file("surface.h5").exists():
-                with h5py.File(self._file("surface.h5"), "r+") as file:
+                with h5py.File(self._file("surface.h5"), "r+", locking=False) as file:
                     keep = int(np.searchsorted(file["time"][:], time, side="right"))
                     for name in ("pressure_coefficient", "time"):
                         file[name].resize(keep, axis=0)
 
-    def _truncate_history(self, step: int) -> None:
-        with (
-            self._file("history.csv").open(newline="", encoding="utf-8") as file,
-            self._replacing("history.csv") as path,
-        ):
-            header, *rows = csv.reader(file)
-            keep = [row for row in rows if len(row) == len(header) and int(row[header.index("step")]) <= step]
-            with path.open("w", newline="", encoding="utf-8") as new:
-                csv.writer(new, lineterminator="\n").writerows([header, *keep])
+    def _truncate_history(self, last: int) -> None:
+        """Keep the complete rows up to a step."""
+        with self._file("history.csv").open(encoding="utf-8") as file, self._replacing("history.csv") as path:
+            header = next(file)
+            step, columns = header.rstrip().split(",").index("step"), header.count(",")
+            complete = (row for row in file if row.endswith("\n") and row.count(",") == columns)
+            with path.open("w", encoding="utf-8") as new:
+                new.write(header)
+                new.writelines(row for row in complete if int(row.split(",")[step]) <= last)
 
     def _file(self, name: str) -> Path:
         return self.path / name
@@ -205,9 +205,11 @@ class RunFolder:
         existing = next(folder for folder in (self.path, *self.path.absolute().parents) if folder.exists())
         free, needed = shutil.disk_usage(existing).free, size + SPARE_BYTES
         if free < needed:
+            resumable = self._file("checkpoint.h5").exists()
+            remedy = f"go on with: alsph resume {self.path}" if resumable else "try again, or use another disk"
             raise RunFolderError(
                 f"{self.path}: disk full, {free / 2**20:.1f} MiB are free and {needed / 2**20:.1f} MiB are needed; "
-                "make room or use another disk"
+                f"make room and {remedy}"
             )
 
     @contextmanager

@@ -93,23 +93,27 @@ class _Driver:
         with Reporter(self.config.until, self.simulation.time, enabled=progress) as reporter:
             try:
                 with _interruptible() as interrupted:
-                    self._loop(reporter, interrupted)
+                    finished = self._loop(reporter, interrupted)
             except SolverError as error:
                 raise SolverError(self._rescue(str(error))) from None
             except BaseException as error:
                 with contextlib.suppress(AlsphError):
                     self._write_status("failed", str(error))
                 raise
-        if interrupted.is_set():
+        if not finished:
             raise KeyboardInterrupt(f"stopped at {self.where}; go on with: alsph resume {self.folder.path}")
 
-    def _loop(self, reporter: Reporter, interrupted: threading.Event) -> None:
+    def _loop(self, reporter: Reporter, interrupted: threading.Event) -> bool:
+        """Step until the end (True) or until interrupted (False)."""
         if self.simulation.step == 0:
             self._output()
+        self._write_status("running")
         while self.simulation.time < self.config.until and not interrupted.is_set():
             self.simulation.run_until(min(self.next_surface, self.next_output, self.config.until), SLICE_SECONDS)
             reporter.update(self._record())
-        self._checkpoint("interrupted" if interrupted.is_set() else "finished")
+        finished = self.simulation.time >= self.config.until
+        self._checkpoint("finished" if finished else "interrupted")
+        return finished
 
     def _record(self) -> dict[str, Any]:
         """Write what is due, and return the new rows of the history."""
@@ -122,7 +126,7 @@ class _Driver:
             self.next_output = next_multiple(time, self.config.run.output_interval)
             self._output()
         elif now - self.checkpointed >= 60 * self.config.run.checkpoint_minutes:
-            self._checkpoint("running")
+            self._checkpoint()
         elif now - self.flushed >= self.config.run.flush_seconds:
             self._flush()
         return rows
@@ -136,7 +140,7 @@ class _Driver:
 
     def _output(self) -> None:
         self.folder.append_particles(self.simulation.time, self.simulation.snapshot())
-        self._checkpoint("running")
+        self._checkpoint()
 
     def _flush(self) -> None:
         if rows := [rows for rows in self.unwritten if len(rows["step"])]:
@@ -145,7 +149,7 @@ class _Driver:
             )
         self.unwritten, self.flushed = [], clock.monotonic()
 
-    def _checkpoint(self, status: str) -> None:
+    def _checkpoint(self, status: str = "running") -> None:
         self._flush()
         self.folder.write_checkpoint(self.simulation.state())
         self.checkpointed = clock.monotonic()
@@ -153,12 +157,13 @@ class _Driver:
 
     def _rescue(self, message: str) -> str:
         """Keep what can be had of a run that broke down; the last checkpoint stays as it is."""
+        kept = self.folder.read_checkpoint()["time"]
         with contextlib.suppress(AlsphError):
             self.unwritten.append(self.simulation.new_history())
             self._flush()
-            self.folder.append_particles(self.simulation.time, self.simulation.snapshot())
-        kept = self.folder.read_checkpoint()
-        message += f"; the last good state, t* = {kept['time']:.4g}, is in {self.folder.path / 'checkpoint.h5'}"
+            if self.simulation.time > kept:
+                self.folder.append_particles(self.simulation.time, self.simulation.snapshot())
+        message += f"; the last good state, t* = {kept:.4g}, is in {self.folder.path / 'checkpoint.h5'}"
         self._write_status("diverged", message)
         return message
 

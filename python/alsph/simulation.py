@@ -155,16 +155,16 @@ class Simulation:
         dict
             The columns of docs/architecture.md, and the force coefficients where the case has a body.
         """
-        self.new_history()
+        rows = self.new_history()
         if not self._history:
-            return {}
+            return rows
         self._history = [{name: np.concatenate([rows[name] for rows in self._history]) for name in self._history[0]}]
         return self._history[0]
 
     def new_history(self) -> dict[str, NDArray[Any]]:
         """Return the rows of the history since the last call of this method or of :meth:`history`."""
         rows = self._engine.take_history()
-        rows |= self._coefficients(rows)
+        rows = {"step": rows["step"], **rows, **self._coefficients(rows)}
         if len(rows["step"]):
             self._history.append(rows)
         return rows

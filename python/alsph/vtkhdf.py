@@ -39,14 +39,14 @@ def append(path: Path, time: float, particles: dict[str, NDArray[Any]]) -> None:
     columns = {name: np.asarray(particles[name], dtype) for name, dtype in FIELDS.items()}
     columns["velocity"] = _three_components(columns["velocity"])
     points = _three_components(np.asarray(particles["position"], np.float32))
-    with h5py.File(path, "a") as file:
+    with h5py.File(path, "a", locking=False) as file:
         root = file["VTKHDF"] if "VTKHDF" in file else _create(file, points, columns)
         _append_part(root, time, points, columns)
 
 
 def truncate(path: Path, time: float) -> None:
     """Drop the outputs later than `time`."""
-    with h5py.File(path, "r+") as file:
+    with h5py.File(path, "r+", locking=False) as file:
         steps = file["VTKHDF/Steps"]
         keep = int(np.searchsorted(steps["Values"][: steps.attrs["NSteps"]], time, side="right"))
         steps.attrs["NSteps"] = keep
