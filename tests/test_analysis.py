@@ -10,6 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic import DRAG, LIFT, STROUHAL, signals
 
+settings.register_profile("alsph", deadline=None)  # busy machines are slow, not wrong
+settings.load_profile("alsph")
+
 FINITE = st.floats(-1e3, 1e3)
 
 
@@ -57,7 +60,7 @@ def test_upward_crossings_of_a_sine_with_noise(frequency, phase, noise):
     assert abs(len(crossings) - 20 * frequency) < 2
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.floats(0.15, 0.25), st.floats(0.0, 15.0), st.floats(0.0, 0.05), st.integers(0, 99))
 def test_the_transient_is_cut_and_the_answers_are_known(strouhal, growth, noise, seed):
     time = uneven_times()
@@ -120,7 +123,6 @@ def test_too_short_a_record_gives_nan_and_a_reason(count):
     assert np.isnan(mean).all() and np.isnan(deviation).all()
 
 
-@settings(deadline=None)
 @given(st.integers(3, 60), st.integers(0, 1000))
 def test_any_short_record_gives_an_answer_without_failing(count, seed):
     rng = np.random.default_rng(seed)
@@ -131,7 +133,7 @@ def test_any_short_record_gives_an_answer_without_failing(count, seed):
         assert isinstance(measure(time, lift, window), Estimate)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.floats(0.1, 0.5), st.floats(0, 6.28), st.integers(4, 20))
 def test_the_spectral_peak_is_far_finer_than_a_bin(frequency, phase, periods):
     end = periods / frequency
