@@ -31,10 +31,10 @@ class Cylinder(Case):
     height: float = Field(default=13.0, gt=0, description="height of the channel [D]")
     upstream: float = Field(default=4.0, gt=0, description="distance from the inlet to the centre of the cylinder [D]")
     perturbation: float = Field(
-        default=0.2,
+        default=0.1,
         ge=0,
         le=1,
-        description="largest velocity of an initial vortex in the wake that starts the shedding; 0: symmetric [U]",
+        description="largest velocity of an initial vortex about the cylinder that starts shedding; 0: symmetric [U]",
     )
 
     @field_validator("resolution")
@@ -102,9 +102,8 @@ class Cylinder(Case):
         )
 
     def _initial_velocity(self, position: FloatArray) -> FloatArray:
-        """Uniform flow and a Gaussian vortex (divergence-free) one diameter behind the rear of the cylinder."""
-        width = 0.5
-        x, y = ((position - [self.upstream + 1.5, 0.0]) / width).T
+        """Uniform flow and a Gaussian vortex (divergence-free) about the cylinder, fastest just off its surface."""
+        x, y = ((position - [self.upstream, 0.0]) / (1.2 * RADIUS)).T
         swirl = self.perturbation * np.exp(0.5 * (1 - x**2 - y**2))
         return np.stack([1.0 - swirl * y, swirl * x], axis=1)
 
