@@ -88,7 +88,7 @@ def history(path: Path) -> dict[str, FloatArray]:
     names = header.split(",")
     if "time" not in names:
         raise RunFolderError(f"{path}: no column 'time' in the first line; is this a run folder of alsph?")
-    rows = [line.replace("True", "1").replace("False", "0") for line in lines if line.count(",") == len(names) - 1]
+    rows = [line for line in lines if line.count(",") == len(names) - 1]
     with _refusing(path, ValueError):
         table = np.loadtxt(rows, delimiter=",", ndmin=2) if rows else np.empty((0, len(names)))
     return dict(zip(names, table.T, strict=True))
