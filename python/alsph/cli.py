@@ -123,7 +123,7 @@ def _options(model: type[Parameters], names: Iterable[str]) -> Iterator[inspect.
             help=f"{model.describe(name)}  [default: {describe_default(model, name)}]",
             show_default=False,
             metavar="|".join(map(str, choices)) or None,
-            parser=functools.partial(_choose, choices) if choices else None,
+            parser=_choice_of(choices) if choices else None,
         )
         yield inspect.Parameter(
             name,
@@ -142,8 +142,13 @@ def _option_type(annotation: Any) -> tuple[type, tuple[Any, ...]]:
     return annotation, ()
 
 
-def _choose(choices: tuple[Any, ...], text: str) -> Any:
-    return next((choice for choice in choices if str(choice) == text), text)
+def _choice_of(choices: tuple[Any, ...]) -> Callable[[str], Any]:
+    """Return a function that finds the choice with a given text."""
+
+    def choice(text: str) -> Any:
+        return next((choice for choice in choices if str(choice) == text), text)
+
+    return choice
 
 
 for _model in cases.CASES.values():
