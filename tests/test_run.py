@@ -248,3 +248,32 @@ def test_sample_is_the_uniform_flow_far_from_the_body(small):
     sample = simulation.sample(np.array([[0.3, 1.5], [100.0, 0.0]]))
     assert sample["velocity"][0] == pytest.approx([1, 0], abs=0.01)
     assert np.isnan(sample["pressure"][1])
+
+
+@pytest.mark.parametrize("algorithm", [1, 2, "original"])
+def test_taylor_green_decays_as_the_exact_solution(algorithm):
+    case = TaylorGreen(resolution=24, perturbation=0.1, algorithm=algorithm)
+    simulation = case.simulation()
+    simulation.run_until(0.3)
+    state = simulation.snapshot()
+    exact = case.exact(state["position"], simulation.time)["velocity"]
+    assert np.abs(exact).max() < 0.8
+    assert np.linalg.norm(state["velocity"] - exact) < 0.02 * np.linalg.norm(exact)
+
+
+def test_taylor_green_in_three_dimensions():
+    simulation = TaylorGreen(resolution=10, dimensions=3).simulation()
+    simulation.advance(5)
+    energy = simulation.history()["kinetic_energy"]
+    assert (np.diff(energy) < 0).all()
+    assert simulation.snapshot()["vorticity"].shape == (1000, 3)
+
+
+def test_as_much_leaves_as_enters(small):
+    simulation = small.simulation()
+    simulation.run_until(3)
+    history = simulation.history()
+    entered, left = (history[name][-1] for name in ("mass_in", "mass_out"))
+    assert entered == pytest.approx(3 * small.height, rel=0.05)
+    assert left == pytest.approx(entered, rel=0.05)
+    assert history["fluid"] == pytest.approx(np.full(simulation.step, simulation.counts["fluid"]), rel=0.03)
