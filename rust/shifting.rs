@@ -1,7 +1,7 @@
 //! Artificial particle displacement. (18) (19)
 
 use crate::frame::Frame;
-use crate::kernel::{Kernel, Smoothing};
+use crate::kernel::{BLOCK, Kernel, Smoothing};
 use crate::neighbours::Row;
 use crate::operators;
 use crate::particles::{ParticleKind, Particles, Vector};
@@ -42,24 +42,28 @@ fn displacements<K: Kernel, const D: usize>(
 ) -> Vec<(Vector<D>, Vector<D>, f64)> {
     let limit = settings.shift_limit * settings.particle_spacing;
     let mut change = vec![(Vector::zeros(), Vector::zeros(), 0.0); particles.real];
-    frame.stencil.neighbours.for_each_one(&mut change, |i, row, (shift, du, dp)| {
-        if particles.kind[i] != ParticleKind::Fluid {
-            return;
-        }
-        let local = Surroundings::of(settings, kernel, particles, row, i);
-        let speed = match settings.shifting {
-            Shifting::Xsph => local.relative_speed,
-            _ => settings.shift_coefficient * velocity_max,
-        };
-        *shift = local.asymmetry * (local.mean_distance * local.mean_distance * speed * time_step);
-        let length = shift.norm();
-        if length > limit {
-            *shift *= limit / length;
-        }
-        let (velocity, pressure) = (&particles.velocity, &particles.pressure);
-        *du = operators::velocity_gradient(row.all(), velocity, velocity[i]) * *shift;
-        *dp = operators::gradient(row.all(), pressure, pressure[i]).dot(shift);
-    });
+    frame.stencil.neighbours.for_each_one(
+        &mut change,
+        #[inline(always)]
+        |i, row, (shift, du, dp)| {
+            if particles.kind[i] != ParticleKind::Fluid {
+                return;
+            }
+            let local = Surroundings::of(settings, kernel, particles, row, i);
+            let speed = match settings.shifting {
+                Shifting::Xsph => local.relative_speed,
+                _ => settings.shift_coefficient * velocity_max,
+            };
+            *shift = local.asymmetry * (local.mean_distance * local.mean_distance * speed * time_step);
+            let length = shift.norm();
+            if length > limit {
+                *shift *= limit / length;
+            }
+            let (velocity, pressure) = (&particles.velocity, &particles.pressure);
+            *du = operators::velocity_gradient(row.all(), velocity, velocity[i]) * *shift;
+            *dp = operators::gradient(row.all(), pressure, pressure[i]).dot(shift);
+        },
+    );
     change
 }
 
@@ -76,22 +80,33 @@ struct Surroundings<const D: usize> {
 impl<const D: usize> Surroundings<D> {
     #[inline(always)]
     fn of<K: Kernel>(settings: &Settings, kernel: Smoothing<K>, particles: &Particles<D>, row: Row<D>, i: usize) -> Self {
-        let radius = settings.support_radius();
+        let limit = settings.support_radius().powi(2);
+        let smallest = 1e-12 * limit;
         let (mut asymmetry, mut relative) = (Vector::zeros(), Vector::zeros());
         let (mut total, mut distances, mut count) = (kernel.value(0.0), 0.0, 0.0);
-        for pair in row.all() {
-            let j = pair.j();
-            let r_ij = particles.position[i] - particles.position[j];
-            let distance = r_ij.norm().max(1e-6 * radius);
-            if distance >= radius {
-                continue; // in the list only for its skin
+        for block in row.all().chunks(BLOCK) {
+            let mut squares = [limit; BLOCK];
+            let (mut values, mut slopes) = ([0.0; BLOCK], [0.0; BLOCK]);
+            for (square, pair) in squares.iter_mut().zip(block) {
+                *square = (particles.position[i] - particles.position[pair.j()]).norm_squared().max(smallest);
             }
-            let weight = kernel.value(distance);
-            asymmetry += r_ij / (distance * distance * distance);
-            relative += (particles.velocity[i] - particles.velocity[j]) * weight;
-            total += weight;
-            distances += distance;
-            count += 1.0;
+            kernel.evaluate(&squares, &mut values, &mut slopes);
+            let mut lengths = squares.map(f64::sqrt);
+            let mut inverse_cubes: [f64; BLOCK] = std::array::from_fn(|k| 1.0 / (squares[k] * lengths[k]));
+            for k in 0..BLOCK {
+                // Beyond the support: in the list only for its skin, or an unused entry of the block.
+                let inside = f64::from(u8::from(squares[k] < limit));
+                lengths[k] *= inside;
+                inverse_cubes[k] *= inside;
+                count += inside;
+            }
+            for (k, pair) in block.iter().enumerate() {
+                let j = pair.j();
+                asymmetry += (particles.position[i] - particles.position[j]) * inverse_cubes[k];
+                relative += (particles.velocity[i] - particles.velocity[j]) * values[k];
+            }
+            total += values.iter().sum::<f64>();
+            distances += lengths.iter().sum::<f64>();
         }
         let mean_distance = if count > 0.0 { distances / count } else { 0.0 };
         Self { asymmetry, mean_distance, relative_speed: relative.norm() / total }

@@ -137,7 +137,7 @@ impl<const D: usize> Simulation<D> {
         }
         let loads = loads(step.settings, &self.particles, &self.frame, &self.walls);
         let mut report = Report::new(step, outcome, &self.particles, &self.frame.stencil.volume, velocity_max, loads);
-        self.scheme.advance_positions(step, &mut self.particles, &mut self.frame); // (12)
+        self.scheme.advance_positions(step, &mut self.particles, &self.frame); // (12)
         shift(step.settings, &mut self.particles, &self.frame, time_step, velocity_max); // (18) (19)
         self.end_step(time_step);
         report.clock = self.clock;
@@ -233,9 +233,13 @@ impl<const D: usize> Simulation<D> {
             simulation.prepare();
             let particles = &simulation.particles;
             let mut gradient = vec![Matrix::zeros(); particles.real];
-            simulation.frame.stencil.neighbours.for_each_one(&mut gradient, |i, row, gradient| {
-                *gradient = operators::velocity_gradient(row.all(), &particles.velocity, particles.velocity[i]);
-            });
+            simulation.frame.stencil.neighbours.for_each_one(
+                &mut gradient,
+                #[inline(always)]
+                |i, row, gradient| {
+                    *gradient = operators::velocity_gradient(row.all(), &particles.velocity, particles.velocity[i]);
+                },
+            );
             Snapshot { volume: simulation.frame.stencil.volume[..particles.real].to_vec(), velocity_gradient: gradient }
         })
     }

@@ -1,6 +1,6 @@
 //! The stencil: all that the derivatives need to know of the particle positions of one frame. (14) (17)
 
-use crate::kernel::{Kernel, Smoothing};
+use crate::kernel::{BLOCK, Kernel, Smoothing};
 use crate::neighbours::{NeighbourList, Weight};
 use crate::particles::{Matrix, Particles, Vector};
 use crate::settings::Settings;
@@ -8,6 +8,9 @@ use crate::with_kernel;
 
 /// Correction tensors with a smaller determinant are taken for singular: too few neighbours for a gradient.
 const SINGULAR: f64 = 1e-3;
+
+/// The square of a distance at which every kernel is zero, for the unused entries of a block.
+const FAR: f64 = 1e100;
 
 #[derive(Debug, Default)]
 pub struct Stencil<const D: usize> {
@@ -32,37 +35,52 @@ impl<const D: usize> Stencil<D> {
     fn volumes<K: Kernel>(&mut self, kernel: Smoothing<K>, particles: &Particles<D>) {
         let position = &particles.position;
         let real = particles.real;
-        self.neighbours.for_each_mut(&mut self.volume[..real], &mut vec![(); real], |i, pairs, volume, ()| {
-            let mut sum = kernel.value(0.0);
-            for pair in pairs {
-                // Coincident particles have no direction; the slope is zero there, so any small distance serves.
-                let distance = (position[i] - position[pair.j()]).norm().max(f64::MIN_POSITIVE);
-                sum += kernel.value(distance);
-                pair.laplacian = kernel.gradient_over_distance(distance) as Weight;
-            }
-            *volume = 1.0 / sum;
-        });
+        self.neighbours.for_each_mut(
+            &mut self.volume[..real],
+            &mut vec![(); real],
+            #[inline(always)]
+            |i, pairs, volume, ()| {
+                let mut sum = kernel.value(0.0);
+                for block in pairs.chunks_mut(BLOCK) {
+                    let (mut squares, mut values, mut slopes) = ([FAR; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
+                    for (square, pair) in squares.iter_mut().zip(&*block) {
+                        *square = (position[i] - position[pair.j()]).norm_squared().max(f64::MIN_POSITIVE);
+                    }
+                    kernel.evaluate(&squares, &mut values, &mut slopes);
+                    sum += values.iter().sum::<f64>();
+                    for (slope, pair) in slopes.iter().zip(block) {
+                        pair.laplacian = *slope as Weight;
+                    }
+                }
+                *volume = 1.0 / sum;
+            },
+        );
     }
 
     /// The correction tensor (17), and the weights with it applied.
     fn weights(&mut self, position: &[Vector<D>]) {
         let volume = &self.volume;
         let real = self.laplacian_factor.len();
-        self.neighbours.for_each_mut(&mut self.laplacian_factor, &mut vec![(); real], |i, pairs, factor, ()| {
-            let mut alpha = Matrix::<D>::zeros();
-            for pair in pairs.iter() {
-                let r_ij = position[i] - position[pair.j()];
-                alpha -= r_ij * r_ij.transpose() * (volume[pair.j()] * f64::from(pair.laplacian));
-            }
-            let correction = correction(&alpha);
-            *factor = 2.0 * (D as f64 + 2.0) / (2.0 + alpha.trace());
-            for pair in pairs {
-                let slope = volume[pair.j()] * f64::from(pair.laplacian);
-                let gradient = correction * (position[i] - position[pair.j()]) * slope;
-                pair.gradient = std::array::from_fn(|k| gradient[k] as Weight);
-                pair.laplacian = (-*factor * slope) as Weight;
-            }
-        });
+        self.neighbours.for_each_mut(
+            &mut self.laplacian_factor,
+            &mut vec![(); real],
+            #[inline(always)]
+            |i, pairs, factor, ()| {
+                let mut alpha = Matrix::<D>::zeros();
+                for pair in pairs.iter() {
+                    let r_ij = position[i] - position[pair.j()];
+                    alpha -= r_ij * r_ij.transpose() * (volume[pair.j()] * f64::from(pair.laplacian));
+                }
+                let correction = correction(&alpha);
+                *factor = 2.0 * (D as f64 + 2.0) / (2.0 + alpha.trace());
+                for pair in pairs {
+                    let slope = volume[pair.j()] * f64::from(pair.laplacian);
+                    let gradient = correction * (position[i] - position[pair.j()]) * slope;
+                    pair.gradient = std::array::from_fn(|k| gradient[k] as Weight);
+                    pair.laplacian = (-*factor * slope) as Weight;
+                }
+            },
+        );
     }
 }
 

@@ -15,6 +15,8 @@ pub struct Grid<const D: usize> {
     starts: Vec<u32>,
     /// Point indices sorted by cell (first direction fastest), then by index.
     items: Vec<u32>,
+    /// The points in the order of `items`.
+    points: Vec<Vector<D>>,
     cell_of: Vec<u32>,
 }
 
@@ -26,6 +28,7 @@ impl<const D: usize> Default for Grid<D> {
             cells: [1; D],
             starts: vec![0, 0],
             items: Vec::new(),
+            points: Vec::new(),
             cell_of: Vec::new(),
         }
     }
@@ -75,6 +78,8 @@ impl<const D: usize> Grid<D> {
         // Each start has moved on to its end, which is the next cell's start.
         self.starts.rotate_right(1);
         self.starts[0] = 0;
+        self.points.clear();
+        self.points.extend(self.items.iter().map(|&item| points[item as usize]));
     }
 
     /// Point indices sorted by cell, then by index.
@@ -82,24 +87,29 @@ impl<const D: usize> Grid<D> {
         &self.items
     }
 
-    /// Call `visit` with each run of point indices that may lie within the search radius of `point`, in a fixed order.
-    #[inline]
-    pub fn for_each_run(&self, point: &Vector<D>, mut visit: impl FnMut(&[u32])) {
+    /// Call `visit` with each run of points, and their indices, that may lie within the search radius of `point`, in a fixed
+    /// order.
+    #[inline(always)]
+    pub fn for_each_run(&self, point: &Vector<D>, mut visit: impl FnMut(&[Vector<D>], &[u32])) {
         let center = self.cell(point);
         let range = |axis: usize| center[axis].saturating_sub(1)..(center[axis] + 2).min(self.cells[axis]);
         let first = range(0);
-        let mut visit_row = |row: usize| visit(&self.items[self.run(row * self.cells[0], &first)]);
+        let mut visit_row = |row: usize| {
+            let run = self.run(row * self.cells[0], &first);
+            visit(&self.points[run.clone()], &self.items[run]);
+        };
         match D {
             2 => range(1).for_each(&mut visit_row),
             _ => range(2).for_each(|k| range(1).for_each(|j| visit_row(k * self.cells[1] + j))),
         }
     }
 
+    #[inline(always)]
     fn run(&self, row_start: usize, cells: &Range<usize>) -> Range<usize> {
         self.starts[row_start + cells.start] as usize..self.starts[row_start + cells.end] as usize
     }
 
-    #[inline]
+    #[inline(always)]
     fn cell(&self, point: &Vector<D>) -> [usize; D] {
         // A float-to-integer cast saturates, so points outside the box land in its border cells.
         std::array::from_fn(|axis| {
@@ -107,7 +117,7 @@ impl<const D: usize> Grid<D> {
         })
     }
 
-    #[inline]
+    #[inline(always)]
     fn flat(&self, cell: [usize; D]) -> usize {
         cell.iter().zip(&self.cells).rev().fold(0, |flat, (&c, &n)| flat * n + c)
     }

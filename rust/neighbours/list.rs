@@ -1,7 +1,7 @@
 //! The flat neighbour list: one row of pairs a real particle, stored chunk by chunk.
 
 use super::Grid;
-use crate::parallel::CHUNK;
+use crate::parallel::{CHUNK, vectorised};
 use crate::particles::{ParticleKind, Particles};
 use rayon::prelude::*;
 
@@ -60,7 +60,8 @@ struct Chunk<const D: usize> {
     pairs: Vec<Pair<D>>,
     /// Start of each row and of its solid part, and the end.
     starts: Vec<[u32; 2]>,
-    solid: Vec<u32>,
+    /// Neighbours of the row in the making.
+    near: Vec<u32>,
 }
 
 impl<const D: usize> Chunk<D> {
@@ -70,29 +71,48 @@ impl<const D: usize> Chunk<D> {
         Row { pairs: &self.pairs[start as usize..self.starts[k + 1][0] as usize], flowing: (solid - start) as usize }
     }
 
+    #[inline(always)]
     fn search(&mut self, rows: std::ops::Range<usize>, particles: &Particles<D>, grid: &Grid<D>, radius: f64) {
-        let blank = |index| Pair { gradient: [0.0; D], laplacian: 0.0, index };
-        let square = radius * radius;
+        let blank = |&index: &u32| Pair { gradient: [0.0; D], laplacian: 0.0, index };
+        let solid = |j: &u32| particles.kind[*j as usize] == ParticleKind::Solid;
         self.pairs.clear();
         self.starts.clear();
         for i in rows {
             let start = self.pairs.len() as u32;
-            let point = particles.position[i];
-            grid.for_each_run(&point, |run| {
-                for &j in run {
-                    if (particles.position[j as usize] - point).norm_squared() < square && j as usize != i {
-                        match particles.kind[j as usize] {
-                            ParticleKind::Solid => self.solid.push(j),
-                            _ => self.pairs.push(blank(j)),
-                        }
-                    }
-                }
-            });
+            find(particles, grid, radius, i, &mut self.near);
+            self.pairs.extend(self.near.iter().filter(|j| !solid(j)).map(blank));
             self.starts.push([start, self.pairs.len() as u32]);
-            self.pairs.extend(self.solid.drain(..).map(blank));
+            if self.pairs.len() < start as usize + self.near.len() {
+                self.pairs.extend(self.near.iter().filter(|j| solid(j)).map(blank));
+            }
         }
         self.starts.push([self.pairs.len() as u32; 2]);
     }
+}
+
+/// Collect in `near` the indices of all others within `radius` of particle `i`.
+#[inline(always)]
+fn find<const D: usize>(particles: &Particles<D>, grid: &Grid<D>, radius: f64, i: usize, near: &mut Vec<u32>) {
+    const BATCH: usize = 32;
+    let point = particles.position[i];
+    let square = radius * radius;
+    let mut count = 0;
+    near.clear();
+    grid.for_each_run(&point, |points, indices| {
+        near.resize(count + points.len(), 0);
+        for (points, indices) in points.chunks(BATCH).zip(indices.chunks(BATCH)) {
+            let mut within = [false; BATCH];
+            for (within, candidate) in within.iter_mut().zip(points) {
+                *within = (candidate - point).norm_squared() < square;
+            }
+            // Every candidate is written, and the next one overwrites it unless it counts: a branch would be mispredicted.
+            for (&j, within) in indices.iter().zip(within) {
+                near[count] = j;
+                count += usize::from(within & (j as usize != i));
+            }
+        }
+    });
+    near.truncate(count);
 }
 
 #[derive(Debug, Default)]
@@ -106,11 +126,15 @@ impl<const D: usize> NeighbourList<D> {
         let rows = particles.real;
         self.chunks.resize_with(rows.div_ceil(CHUNK), Chunk::default);
         self.chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
-            chunk.search(c * CHUNK..((c + 1) * CHUNK).min(rows), particles, grid, radius);
+            let rows = c * CHUNK..((c + 1) * CHUNK).min(rows);
+            vectorised(
+                #[inline(always)]
+                || chunk.search(rows, particles, grid, radius),
+            );
         });
     }
 
-    /// `f(i, row, &mut a[i], &mut b[i])` for every row, in parallel.
+    /// `f(i, row, &mut a[i], &mut b[i])` for every row, in parallel. Mark `f` `#[inline(always)]`, see [`vectorised`].
     pub fn for_each<A: Send, B: Send>(
         &self,
         a: &mut [A],
@@ -119,17 +143,27 @@ impl<const D: usize> NeighbourList<D> {
     ) {
         let outputs = a.par_chunks_mut(CHUNK).zip(b.par_chunks_mut(CHUNK));
         self.chunks.par_iter().zip(outputs).enumerate().for_each(|(c, (chunk, (a, b)))| {
-            for (k, (a, b)) in a.iter_mut().zip(b).enumerate() {
-                f(c * CHUNK + k, chunk.row(k), a, b);
-            }
+            vectorised(
+                #[inline(always)]
+                || {
+                    for (k, (a, b)) in a.iter_mut().zip(b).enumerate() {
+                        f(c * CHUNK + k, chunk.row(k), a, b);
+                    }
+                },
+            );
         });
     }
 
-    /// `f(i, row, &mut out[i])` for every row, in parallel.
+    /// `f(i, row, &mut out[i])` for every row, in parallel. Mark `f` `#[inline(always)]`, see [`vectorised`].
     pub fn for_each_one<A: Send>(&self, out: &mut [A], f: impl Fn(usize, Row<D>, &mut A) + Sync + Send) {
         // A vector of () takes no memory.
         let mut nothing = vec![(); out.len()];
-        self.for_each(out, &mut nothing, |i, row, out, ()| f(i, row, out));
+        self.for_each(
+            out,
+            &mut nothing,
+            #[inline(always)]
+            |i, row, out, ()| f(i, row, out),
+        );
     }
 
     /// Fill the pairs of every row in parallel.
@@ -141,10 +175,15 @@ impl<const D: usize> NeighbourList<D> {
     ) {
         let outputs = a.par_chunks_mut(CHUNK).zip(b.par_chunks_mut(CHUNK));
         self.chunks.par_iter_mut().zip(outputs).enumerate().for_each(|(c, (chunk, (a, b)))| {
-            for (k, (a, b)) in a.iter_mut().zip(b).enumerate() {
-                let range = chunk.starts[k][0] as usize..chunk.starts[k + 1][0] as usize;
-                f(c * CHUNK + k, &mut chunk.pairs[range], a, b);
-            }
+            vectorised(
+                #[inline(always)]
+                || {
+                    for (k, (a, b)) in a.iter_mut().zip(b).enumerate() {
+                        let range = chunk.starts[k][0] as usize..chunk.starts[k + 1][0] as usize;
+                        f(c * CHUNK + k, &mut chunk.pairs[range], a, b);
+                    }
+                },
+            );
         });
     }
 

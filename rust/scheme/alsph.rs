@@ -101,6 +101,7 @@ impl<const D: usize> Alsph<D> {
         frame.stencil.neighbours.for_each(
             &mut self.divergence_pressure[..real],
             &mut self.velocity_laplacian,
+            #[inline(always)]
             |i, row, [divergence, _], laplacian| {
                 (*laplacian, *divergence) = operators::laplacian_and_divergence(row.flowing(), velocity, velocity[i]);
                 *divergence += operators::divergence(row.solid(), velocity, velocity[i]);
@@ -126,6 +127,7 @@ impl<const D: usize> Alsph<D> {
         frame.stencil.neighbours.for_each(
             &mut self.velocity_star[..real],
             &mut self.pressure_laplacian,
+            #[inline(always)]
             |i, row, star, pressure_laplacian| {
                 let (penalty, p) = operators::gradient_and_laplacian(row.all(), fields, fields[i]);
                 let still = match particles.kind[i] {
@@ -151,19 +153,23 @@ impl<const D: usize> Alsph<D> {
         let Step { settings, time_step: dt, penalty } = step;
         let paper_walls = settings.wall_pressure == WallPressure::Paper;
         let (star, initial, laplacian) = (&self.velocity_star, &self.velocity_initial, &self.pressure_laplacian);
-        frame.stencil.neighbours.for_each_one(&mut pressure[..*real], |i, row, p| {
-            let solid = kind[i] == ParticleKind::Solid;
-            if kind[i] == ParticleKind::Outlet {
-                *p = 0.0;
-            } else if !solid || paper_walls {
-                let divergence = operators::divergence(row.all(), star, star[i]);
-                *p -= penalty * (settings.density * divergence - dt * laplacian[i]);
-            }
-            if solid && paper_walls {
-                // ∂p/∂n r_s with the pseudo-acceleration Δu/Δt and, from (12), the pseudo-displacement ½ Δu Δt.
-                *p += 0.5 * settings.density * (star[i] - initial[i]).dot(&normal[i]).powi(2);
-            }
-        });
+        frame.stencil.neighbours.for_each_one(
+            &mut pressure[..*real],
+            #[inline(always)]
+            |i, row, p| {
+                let solid = kind[i] == ParticleKind::Solid;
+                if kind[i] == ParticleKind::Outlet {
+                    *p = 0.0;
+                } else if !solid || paper_walls {
+                    let divergence = operators::divergence(row.all(), star, star[i]);
+                    *p -= penalty * (settings.density * divergence - dt * laplacian[i]);
+                }
+                if solid && paper_walls {
+                    // ∂p/∂n r_s with the pseudo-acceleration Δu/Δt and, from (12), the pseudo-displacement ½ Δu Δt.
+                    *p += 0.5 * settings.density * (star[i] - initial[i]).dot(&normal[i]).powi(2);
+                }
+            },
+        );
         if !paper_walls {
             extrapolate_wall_pressure(settings, particles, frame);
         }
@@ -178,11 +184,15 @@ impl<const D: usize> Alsph<D> {
         let Particles { real, kind, pressure, velocity, .. } = particles;
         let (kind, pressure, star) = (&*kind, &*pressure, &self.velocity_star);
         let factor = step.time_step / step.settings.density;
-        frame.stencil.neighbours.for_each_one(&mut velocity[..*real], |i, row, u| {
-            if kind[i] == ParticleKind::Fluid {
-                *u = star[i] - operators::gradient(row.all(), pressure, pressure[i]) * factor;
-            }
-        });
+        frame.stencil.neighbours.for_each_one(
+            &mut velocity[..*real],
+            #[inline(always)]
+            |i, row, u| {
+                if kind[i] == ParticleKind::Fluid {
+                    *u = star[i] - operators::gradient(row.all(), pressure, pressure[i]) * factor;
+                }
+            },
+        );
         frame.images.vectors(&mut particles.velocity);
     }
 
@@ -226,12 +236,16 @@ fn extrapolate_wall_velocity<const D: usize>(
     }
     let Particles { real, kind, position, velocity, .. } = particles;
     walls.viscous_velocity.resize(particles.len(), Vector::zeros());
-    frame.stencil.neighbours.for_each_one(&mut walls.viscous_velocity[..*real], |i, row, seen| {
-        if kind[i] == ParticleKind::Solid {
-            let average = shepard(settings, position, row, i, |j, _| velocity[j].into());
-            *seen = average.map_or(velocity[i], |average| velocity[i] * 2.0 - Vector::from(average));
-        }
-    });
+    frame.stencil.neighbours.for_each_one(
+        &mut walls.viscous_velocity[..*real],
+        #[inline(always)]
+        |i, row, seen| {
+            if kind[i] == ParticleKind::Solid {
+                let average = shepard(settings, position, row, i, |j, _| velocity[j].into());
+                *seen = average.map_or(velocity[i], |average| velocity[i] * 2.0 - Vector::from(average));
+            }
+        },
+    );
     frame.images.vectors(&mut walls.viscous_velocity);
 }
 
@@ -241,12 +255,16 @@ fn extrapolate_wall_pressure<const D: usize>(settings: &Settings, particles: &mu
     let gravity = Vector::<D>::from_column_slice(&settings.body_force);
     let Particles { real, kind, position, pressure, .. } = particles;
     let fluid = pressure.clone();
-    frame.stencil.neighbours.for_each_one(&mut pressure[..*real], |i, row, p| {
-        if kind[i] == ParticleKind::Solid {
-            let at = |j: usize, r_ij: Vector<D>| [fluid[j] + settings.density * gravity.dot(&r_ij)];
-            *p = shepard(settings, position, row, i, at).map_or(0.0, |[average]| average);
-        }
-    });
+    frame.stencil.neighbours.for_each_one(
+        &mut pressure[..*real],
+        #[inline(always)]
+        |i, row, p| {
+            if kind[i] == ParticleKind::Solid {
+                let at = |j: usize, r_ij: Vector<D>| [fluid[j] + settings.density * gravity.dot(&r_ij)];
+                *p = shepard(settings, position, row, i, at).map_or(0.0, |[average]| average);
+            }
+        },
+    );
 }
 
 fn copy<T: Copy>(from: &[T], to: &mut Vec<T>) {

@@ -1,0 +1,64 @@
+//! Settings and particle sets that the tests share.
+#![allow(dead_code)] // not every test uses every helper
+
+use alsph::settings::Settings;
+use alsph::{ParticleKind, Particles, Vector};
+use proptest::prelude::*;
+use serde_json::{Value, json};
+
+/// Settings of a unit box with the same boundary on every side, no bodies but one still one named "wall".
+pub fn settings_value<const D: usize>(particle_spacing: f64, boundary: &str) -> Value {
+    json!({
+        "dimensions": D, "particle_spacing": particle_spacing, "smoothing_ratio": 4.0 / 3.0, "kernel": "quintic_spline",
+        "density": 1.0, "kinematic_viscosity": 0.01, "body_force": vec![0.0; D],
+        "time_step": 0.05 * particle_spacing, "adaptive_time_step": true, "time_step_safety": 0.9,
+        "derivative_frame": "initial", "search_every_iteration": false,
+        "max_iterations": 5, "divergence_tolerance": 1e-3, "penalty_constant": 100.0,
+        "velocity_laplacian": "scalar", "shifting": "xsph", "shift_coefficient": 0.04, "shift_limit": 0.1,
+        "wall_velocity": "adami", "wall_pressure": "paper",
+        "domain": {"lower": vec![0.0; D], "upper": vec![1.0; D], "boundaries": vec![[boundary; 2]; D]},
+        "bodies": [{"name": "wall", "velocity": vec![0.0; D], "moves": false, "center": vec![0.0; D]}],
+    })
+}
+
+pub fn settings<const D: usize>(particle_spacing: f64, boundary: &str) -> Settings {
+    parse(&settings_value::<D>(particle_spacing, boundary))
+}
+
+pub fn parse(value: &Value) -> Settings {
+    Settings::from_json(&value.to_string()).expect("valid settings")
+}
+
+/// Fluid at rest at `points`.
+pub fn particles<const D: usize>(points: Vec<Vector<D>>) -> Particles<D> {
+    let count = points.len();
+    Particles {
+        real: count,
+        position: points,
+        velocity: vec![Vector::zeros(); count],
+        pressure: vec![0.0; count],
+        kind: vec![ParticleKind::Fluid; count],
+        body: vec![0; count],
+        normal: vec![Vector::zeros(); count],
+        depth: vec![0.0; count],
+        id: (0..count as u64).collect(),
+    }
+}
+
+/// The cell-centred lattice of the unit box with `side` particles a direction, displaced by up to `disorder` spacings.
+pub fn lattice<const D: usize>(side: usize, disorder: f64) -> Vec<Vector<D>> {
+    let mut seed = 7u64;
+    let mut random = || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 33) as f64 / (1u64 << 30) as f64 - 1.0
+    };
+    (0..side.pow(D as u32))
+        .map(|i| {
+            Vector::from_fn(|axis, _| ((i / side.pow(axis as u32) % side) as f64 + 0.5 + disorder * random()) / side as f64)
+        })
+        .collect()
+}
+
+pub fn boundary() -> impl Strategy<Value = &'static str> {
+    prop_oneof![Just("none"), Just("slip"), Just("periodic")]
+}

@@ -1,0 +1,101 @@
+//! The grid search against brute force, periodic sides and slip walls included.
+
+use alsph::frame::Frame;
+use alsph::neighbours::brute_force_neighbours;
+use alsph::settings::Settings;
+use alsph::{ParticleKind, Particles, Vector};
+use proptest::prelude::*;
+
+mod common;
+
+/// Every real particle's neighbours, sorted.
+fn listed<const D: usize>(frame: &Frame<D>, particles: &Particles<D>) -> Vec<Vec<u32>> {
+    (0..particles.real)
+        .map(|i| {
+            let mut row: Vec<u32> = frame.stencil.neighbours.row(i).all().iter().map(|pair| pair.index).collect();
+            row.sort_unstable();
+            row
+        })
+        .collect()
+}
+
+/// Distances of every real particle to its periodic and mirror images by trying all 3^D boxes around the domain.
+fn counts_by_images<const D: usize>(settings: &Settings, particles: &Particles<D>) -> Vec<usize> {
+    use alsph::settings::Boundary;
+    let real: Vec<Vector<D>> = particles.position[..particles.real].to_vec();
+    let mut all = Vec::new();
+    for code in 0..3usize.pow(D as u32) {
+        'particle: for point in &real {
+            let mut image = *point;
+            for axis in 0..D {
+                let side = code / 3usize.pow(axis as u32) % 3;
+                let (lower, upper) = (settings.domain.lower[axis], settings.domain.upper[axis]);
+                let [low, high] = settings.domain.boundaries[axis];
+                match (side, low, high) {
+                    (0, ..) => {}
+                    (1, Boundary::Periodic, _) => image[axis] += upper - lower,
+                    (2, Boundary::Periodic, _) => image[axis] -= upper - lower,
+                    (1, Boundary::Slip, _) => image[axis] = 2.0 * lower - image[axis],
+                    (2, _, Boundary::Slip) => image[axis] = 2.0 * upper - image[axis],
+                    _ => continue 'particle,
+                }
+            }
+            all.push(image);
+        }
+    }
+    let radius = settings.support_radius();
+    real.iter().map(|point| all.iter().filter(|other| (*other - point).norm() < radius).count() - 1).collect()
+}
+
+fn check<const D: usize>(points: Vec<Vector<D>>, boundary: &str, solid: u64) -> Result<(), TestCaseError> {
+    let settings = common::settings::<D>(0.1, boundary);
+    let mut particles = common::particles(points);
+    for (i, kind) in particles.kind.iter_mut().enumerate() {
+        if i as u64 % 7 < solid {
+            *kind = ParticleKind::Solid;
+        }
+    }
+    let mut frame = Frame::default();
+    frame.search(&settings, &mut particles, 0.0);
+    let expected = brute_force_neighbours(&particles.position, particles.real, settings.support_radius());
+    prop_assert_eq!(listed(&frame, &particles), expected);
+    let counts: Vec<usize> = listed(&frame, &particles).iter().map(Vec::len).collect();
+    prop_assert_eq!(counts, counts_by_images(&settings, &particles));
+    for i in 0..particles.real {
+        let row = frame.stencil.neighbours.row(i);
+        prop_assert!(row.flowing().iter().all(|pair| particles.kind[pair.j()] != ParticleKind::Solid));
+        prop_assert!(row.solid().iter().all(|pair| particles.kind[pair.j()] == ParticleKind::Solid));
+    }
+    Ok(())
+}
+
+fn points<const D: usize>(most: usize) -> impl Strategy<Value = Vec<Vector<D>>> {
+    proptest::collection::vec(proptest::array::uniform::<_, D>(1e-6..1.0 - 1e-6), 1..most)
+        .prop_map(|points| points.into_iter().map(Vector::from).collect())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn search_in_2d_finds_what_brute_force_finds(points in points::<2>(400), boundary in common::boundary(), solid in 0u64..3) {
+        check(points, boundary, solid)?;
+    }
+
+    #[test]
+    fn search_in_3d_finds_what_brute_force_finds(points in points::<3>(200), boundary in common::boundary(), solid in 0u64..3) {
+        check(points, boundary, solid)?;
+    }
+}
+
+#[test]
+fn far_strays_cost_no_memory() {
+    let mut points: Vec<Vector<2>> = (0..100).map(|i| Vector::from([0.01 * i as f64, 0.0])).collect();
+    points.push(Vector::from([1e12, -1e15]));
+    let settings = common::settings::<2>(0.1, "none");
+    let mut particles = common::particles(points);
+    let mut frame = Frame::default();
+    frame.search(&settings, &mut particles, 0.0);
+    let expected = brute_force_neighbours(&particles.position, particles.real, settings.support_radius());
+    assert_eq!(listed(&frame, &particles), expected);
+}
