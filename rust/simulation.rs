@@ -17,7 +17,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// The adaptive time step may not fall below this fraction of the user's: by then the velocity has blown up.
-const SMALLEST_TIME_STEP: f64 = 1e-2;
+const SMALLEST_TIME_STEP: f64 = 1e-4;
 
 /// Counters that go on through a restart.
 #[derive(Clone, Copy, Debug, Default)]
@@ -131,7 +131,7 @@ impl<const D: usize> Simulation<D> {
         let step = Step { settings: &self.settings, time_step, penalty };
 
         let outcome = self.scheme.iterate(step, &mut self.particles, &mut self.frame, &mut self.walls);
-        if let Err(error) = self.check_fields() {
+        if let Err(error) = self.check_fields(time_step) {
             self.restore_initial();
             return Err(error);
         }
@@ -196,13 +196,14 @@ impl<const D: usize> Simulation<D> {
         Ok(settings.time_step.min(penalty).min(limits.viscous).min(limits.body_force))
     }
 
-    /// An error if the step left a value that is not a number.
-    fn check_fields(&self) -> Result<()> {
+    /// An error if the step left a value that is not a number, or a particle that would cross more than Δx in a step.
+    fn check_fields(&self, time_step: f64) -> Result<()> {
         let particles = &self.particles;
-        for i in 0..particles.real {
-            let velocity = particles.velocity[i].sum();
-            if !velocity.is_finite() {
-                return Err(self.diverged(i, "velocity", velocity));
+        let fastest = self.settings.particle_spacing / time_step;
+        for i in (0..particles.real).filter(|&i| particles.kind[i] != ParticleKind::Solid) {
+            let speed = particles.velocity[i].norm();
+            if speed.is_nan() || speed > fastest {
+                return Err(self.diverged(i, "velocity", speed));
             }
             if !particles.pressure[i].is_finite() {
                 return Err(self.diverged(i, "pressure", particles.pressure[i]));

@@ -1,0 +1,318 @@
+//! Whole steps: exact solutions, symmetry, conservation, and the same bits on any number of threads.
+
+use alsph::{Clock, ParticleKind, Particles, Settings, Simulation, Vector};
+use approx::assert_relative_eq;
+use serde_json::{Value, json};
+use std::f64::consts::PI;
+
+mod common;
+
+const ALGORITHMS: [(&str, bool); 3] = [("initial", false), ("updated", false), ("updated", true)];
+
+fn with_algorithm(mut value: Value, (frame, search): (&str, bool)) -> Settings {
+    value["derivative_frame"] = frame.into();
+    value["search_every_iteration"] = search.into();
+    common::parse(&value)
+}
+
+/// Taylor-Green: u = −U e^{−8π²νt} cos 2πx sin 2πy, v = U e^{−8π²νt} sin 2πx cos 2πy in the unit square.
+fn taylor_green(side: usize, disorder: f64) -> Particles<2> {
+    let mut particles = common::particles(common::lattice::<2>(side, disorder));
+    for i in 0..particles.real {
+        let [x, y] = [0, 1].map(|k| 2.0 * PI * particles.position[i][k]);
+        particles.velocity[i] = Vector::from([-x.cos() * y.sin(), x.sin() * y.cos()]);
+        particles.pressure[i] = -0.25 * ((2.0 * x).cos() + (2.0 * y).cos());
+    }
+    particles
+}
+
+#[test]
+fn taylor_green_decays_as_the_exact_solution() {
+    for algorithm in ALGORITHMS {
+        let settings = with_algorithm(common::settings_value::<2>(1.0 / 32.0, "periodic"), algorithm);
+        let mut simulation = Simulation::new(settings, taylor_green(32, 0.0), Clock::default(), Some(2)).expect("valid");
+        simulation.advance_until(0.5, None).expect("stable");
+        let time = simulation.clock().time;
+        let decay = (-8.0 * PI * PI * 0.01 * time).exp();
+        let particles = simulation.particles();
+        let (mut error, mut energy) = (0.0, 0.0);
+        for i in 0..particles.real {
+            let [x, y] = [0, 1].map(|k| 2.0 * PI * particles.position[i][k]);
+            let exact = Vector::from([-x.cos() * y.sin(), x.sin() * y.cos()]) * decay;
+            error += (particles.velocity[i] - exact).norm() / particles.real as f64;
+            energy += particles.velocity[i].norm_squared() / particles.real as f64;
+        }
+        assert!(error / decay < 0.02, "{algorithm:?}: mean error {:.4} of the largest velocity", error / decay);
+        assert_relative_eq!(energy, 0.5 * decay * decay, max_relative = 0.03);
+        let last = simulation.take_history().pop().expect("steps were taken");
+        assert!(last.outcome.divergence_sum / 1024.0 < 0.02);
+        assert_relative_eq!(last.volume, 1.0, max_relative = 0.005);
+    }
+}
+
+#[test]
+fn taylor_green_in_3d_keeps_its_plane_flow() {
+    // The 2-D vortex, uniform in z, is an exact solution in 3-D too.
+    let side = 14;
+    let settings = common::settings::<3>(1.0 / side as f64, "periodic");
+    let mut particles = common::particles(common::lattice::<3>(side, 0.0));
+    for i in 0..particles.real {
+        let [x, y] = [0, 1].map(|k| 2.0 * PI * particles.position[i][k]);
+        particles.velocity[i] = Vector::from([-x.cos() * y.sin(), x.sin() * y.cos(), 0.0]);
+        particles.pressure[i] = -0.25 * ((2.0 * x).cos() + (2.0 * y).cos());
+    }
+    let mut simulation = Simulation::new(settings, particles, Clock::default(), Some(2)).expect("valid");
+    simulation.advance_until(0.15, None).expect("stable");
+    let decay = (-8.0 * PI * PI * 0.01 * simulation.clock().time).exp();
+    let particles = simulation.particles();
+    let mean = |f: &dyn Fn(usize) -> f64| (0..particles.real).map(f).sum::<f64>() / particles.real as f64;
+    assert_relative_eq!(mean(&|i| particles.velocity[i].norm_squared()), 0.5 * decay * decay, max_relative = 0.06);
+    assert!(mean(&|i| particles.velocity[i][2].abs()) < 1e-3);
+}
+
+/// A channel between slip walls at y = ±½ with inlet and outlet, and a block of solids if asked for. Its halves are mirror
+/// images in floating point too.
+fn channel(side: usize, block: bool) -> (Value, Particles<2>) {
+    let spacing = 1.0 / side as f64;
+    let mut value = common::settings_value::<2>(spacing, "slip");
+    value["domain"] =
+        json!({"lower": [0.0, -0.5], "upper": [1.0, 0.5], "boundaries": [["inlet", "outlet"], ["slip", "slip"]]});
+    let columns = (6.0 * 4.0 / 3.0 - 1e-9_f64).ceil() as i64;
+    let mut particles = common::particles(Vec::new());
+    for column in -columns..side as i64 + columns {
+        for row in 0..side {
+            let position = Vector::from([(column as f64 + 0.5) * spacing, (row as f64 + 0.5 - 0.5 * side as f64) * spacing]);
+            let solid = block && (position - Vector::from([0.5, 0.0])).abs().max() < 0.15;
+            particles.position.push(position);
+            particles.kind.push(match column {
+                _ if column < 0 => ParticleKind::Inlet,
+                _ if column >= side as i64 => ParticleKind::Outlet,
+                _ if solid => ParticleKind::Solid,
+                _ => ParticleKind::Fluid,
+            });
+            particles.velocity.push(Vector::from([if solid { 0.0 } else { 1.0 }, 0.0]));
+        }
+    }
+    let count = particles.position.len();
+    particles.real = count;
+    particles.pressure = vec![0.0; count];
+    particles.body = vec![0; count];
+    particles.normal = vec![Vector::zeros(); count];
+    particles.depth = vec![0.5 * spacing; count];
+    particles.id = (0..count as u64).collect();
+    (value, particles)
+}
+
+#[test]
+fn plug_flow_between_slip_walls_stays_uniform() {
+    for algorithm in ALGORITHMS {
+        let (value, particles) = channel(16, false);
+        let settings = with_algorithm(value, algorithm);
+        let fluid = particles.counts()[ParticleKind::Fluid as usize];
+        let mut simulation = Simulation::new(settings, particles, Clock::default(), Some(1)).expect("valid");
+        simulation.advance_until(1.5, None).expect("stable");
+        let particles = simulation.particles();
+        for i in 0..particles.real {
+            assert_relative_eq!(particles.velocity[i], Vector::from([1.0, 0.0]), epsilon = 1e-9);
+            assert_relative_eq!(particles.pressure[i], 0.0, epsilon = 1e-9);
+        }
+        let last = simulation.take_history().pop().expect("steps were taken");
+        assert!(last.outcome.converged && last.outcome.iterations == 1);
+        assert_eq!(last.counts[ParticleKind::Fluid as usize], fluid);
+        assert_relative_eq!(last.clock.mass_in, last.clock.mass_out, epsilon = 1e-12);
+        assert_relative_eq!(last.clock.mass_in, 1.5, epsilon = 1.0 / 16.0 + 1e-9);
+    }
+}
+
+fn bits(particles: &Particles<2>) -> Vec<u64> {
+    let vectors = particles.position.iter().chain(&particles.velocity).flat_map(|v| v.iter().copied());
+    vectors.chain(particles.pressure.iter().copied()).map(f64::to_bits).chain(particles.id.iter().copied()).collect()
+}
+
+#[test]
+fn threads_change_no_bit() {
+    for algorithm in ALGORITHMS {
+        for (wall_velocity, wall_pressure) in [("adami", "paper"), ("morris", "adami"), ("paper", "paper")] {
+            let run = |threads| {
+                let (mut value, particles) = channel(24, true);
+                value["wall_velocity"] = wall_velocity.into();
+                value["wall_pressure"] = wall_pressure.into();
+                let settings = with_algorithm(value, algorithm);
+                let mut simulation = Simulation::new(settings, particles, Clock::default(), Some(threads)).expect("valid");
+                simulation.advance(40, None).expect("stable");
+                let history = format!("{:?}", simulation.take_history());
+                (bits(simulation.particles()), history)
+            };
+            let one = run(1);
+            assert_eq!(one, run(2));
+            assert_eq!(one, run(3));
+        }
+    }
+}
+
+#[test]
+fn a_restored_simulation_goes_on_to_the_last_bit() {
+    for algorithm in ALGORITHMS {
+        let (value, particles) = channel(24, true);
+        let settings = with_algorithm(value, algorithm);
+        let mut whole = Simulation::new(settings.clone(), particles, Clock::default(), Some(2)).expect("valid");
+        whole.advance(20, None).expect("stable");
+        let mut saved = whole.particles().clone();
+        saved.drop_images();
+        let mut resumed = Simulation::new(settings, saved, whole.clock(), Some(1)).expect("valid");
+        // Looking at the flow must not disturb it.
+        whole.snapshot();
+        whole.sample(&[Vector::from([0.2, -0.3])]);
+        whole.advance(20, None).expect("stable");
+        resumed.advance(20, None).expect("stable");
+        assert_eq!(bits(whole.particles()), bits(resumed.particles()));
+    }
+}
+
+#[test]
+fn symmetric_flow_has_no_lift() {
+    for algorithm in ALGORITHMS {
+        let (value, particles) = channel(24, true);
+        let mut simulation =
+            Simulation::new(with_algorithm(value, algorithm), particles, Clock::default(), Some(2)).expect("valid");
+        simulation.advance_until(0.5, None).expect("stable");
+        for report in simulation.take_history() {
+            let load = &report.loads[0];
+            assert!((load.pressure_force[1] + load.viscous_force[1]).abs() < 1e-7, "lift {:?}", load);
+        }
+    }
+}
+
+/// A box of fluid at rest under gravity between solid walls two support radii deep.
+fn tank(wall_pressure: &str) -> (Settings, Particles<2>) {
+    let (side, layers) = (16i64, 4i64);
+    let spacing = 1.0 / side as f64;
+    let mut value = common::settings_value::<2>(spacing, "none");
+    value["wall_pressure"] = wall_pressure.into();
+    value["body_force"] = json!([0.0, -1.0]);
+    value["domain"]["boundaries"] = json!([["periodic", "periodic"], ["none", "none"]]);
+    let mut particles = common::particles(Vec::new());
+    for column in 0..side {
+        for row in -layers..side + layers {
+            let position = Vector::from([(column as f64 + 0.5) * spacing, (row as f64 + 0.5) * spacing]);
+            let depth = (-position[1]).max(position[1] - 1.0);
+            particles.position.push(position);
+            particles.kind.push(if depth > 0.0 { ParticleKind::Solid } else { ParticleKind::Fluid });
+            particles.normal.push(Vector::from([
+                0.0,
+                if depth <= 0.0 {
+                    0.0
+                } else if position[1] < 0.0 {
+                    1.0
+                } else {
+                    -1.0
+                },
+            ]));
+            particles.depth.push(depth.max(0.0));
+            // Start from hydrostatics: with u_max = 0 the penalty vanishes and nothing may move.
+            particles.pressure.push(0.5 - position[1]);
+        }
+    }
+    let count = particles.position.len();
+    particles.real = count;
+    particles.velocity = vec![Vector::zeros(); count];
+    particles.body = vec![0; count];
+    particles.id = (0..count as u64).collect();
+    (common::parse(&value), particles)
+}
+
+#[test]
+fn hydrostatic_pressure_holds_the_fluid_and_weighs_on_the_walls() {
+    for rule in ["paper", "adami"] {
+        let (settings, particles) = tank(rule);
+        let mut simulation = Simulation::new(settings, particles, Clock::default(), Some(2)).expect("valid");
+        simulation.advance(50, None).expect("stable");
+        let particles = simulation.particles();
+        let fastest = particles.velocity.iter().map(|u| u.norm()).fold(0.0, f64::max);
+        assert!(fastest < 0.02, "{rule}: the fluid at rest moves at {fastest}");
+        let load = simulation.take_history().pop().expect("steps were taken").loads[0];
+        // The weight of the unit square of fluid, both walls together.
+        assert_relative_eq!(load.pressure_force[1], -1.0, max_relative = 0.03);
+        assert_relative_eq!(load.pressure_force[0], 0.0, epsilon = 1e-6);
+    }
+}
+
+#[test]
+fn couette_flow_is_driven_by_its_sliding_wall() {
+    for (wall_velocity, tolerance) in [("adami", 0.03), ("morris", 0.06)] {
+        let (settings, mut particles) = tank("paper");
+        let mut value = serde_json::to_value(&settings).expect("settings serialise");
+        value["wall_velocity"] = wall_velocity.into();
+        value["body_force"] = json!([0.0, 0.0]);
+        value["kinematic_viscosity"] = 1.0.into();
+        value["bodies"] = json!([
+            {"name": "floor", "velocity": [0.0, 0.0], "moves": false, "center": [0.0, 0.0]},
+            {"name": "lid", "velocity": [1.0, 0.0], "moves": false, "center": [0.0, 1.0]},
+        ]);
+        for i in 0..particles.real {
+            particles.pressure[i] = 0.0;
+            particles.body[i] = u16::from(particles.kind[i] == ParticleKind::Solid && particles.position[i][1] > 1.0);
+        }
+        let mut simulation = Simulation::new(common::parse(&value), particles, Clock::default(), Some(2)).expect("valid");
+        simulation.advance_until(0.8, None).expect("stable");
+        let particles = simulation.particles();
+        for i in (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Fluid) {
+            let error = particles.velocity[i][0] - particles.position[i][1];
+            assert!(error.abs() < tolerance, "{wall_velocity}: {error} at y = {}", particles.position[i][1]);
+        }
+        let last = simulation.take_history().pop().expect("steps were taken");
+        // Shear stress ρν ∂u/∂y = 1 on either wall.
+        for (load, expected) in last.loads.iter().zip([1.0, -1.0]) {
+            assert_relative_eq!(load.viscous_force[0], expected, max_relative = 2.0 * tolerance);
+        }
+    }
+}
+
+#[test]
+fn a_moving_body_carries_its_particles_along() {
+    let (mut value, particles) = channel(24, true);
+    value["bodies"][0]["velocity"] = json!([0.5, 0.0]);
+    value["bodies"][0]["moves"] = true.into();
+    let before: Vec<_> = solids(&particles);
+    let mut simulation = Simulation::new(common::parse(&value), particles, Clock::default(), Some(2)).expect("valid");
+    simulation.advance_until(0.1, None).expect("stable");
+    let time = simulation.clock().time;
+    for (old, new) in before.iter().zip(solids(simulation.particles())) {
+        assert_relative_eq!(new.1 - old.1, Vector::from([0.5 * time, 0.0]), epsilon = 1e-12);
+    }
+}
+
+fn solids(particles: &Particles<2>) -> Vec<(u64, Vector<2>)> {
+    let mut solids: Vec<_> = (0..particles.real)
+        .filter(|&i| particles.kind[i] == ParticleKind::Solid)
+        .map(|i| (particles.id[i], particles.position[i]))
+        .collect();
+    solids.sort_by_key(|solid| solid.0);
+    solids
+}
+
+#[test]
+fn a_step_beyond_the_stability_law_ends_in_an_error_and_the_last_good_state() {
+    let mut value = common::settings_value::<2>(1.0 / 24.0, "periodic");
+    value["adaptive_time_step"] = false.into();
+    value["time_step"] = (0.3 / 24.0).into();
+    let mut simulation =
+        Simulation::new(common::parse(&value), taylor_green(24, 0.1), Clock::default(), Some(2)).expect("valid");
+    let error = simulation.advance(10_000, None).expect_err("three times the stable step");
+    assert!(error.to_string().contains("diverged at step"), "{error}");
+    let particles = simulation.particles();
+    assert!(particles.position.iter().chain(&particles.velocity).all(|v| v.iter().all(|x| x.is_finite())));
+}
+
+#[test]
+fn the_adaptive_step_obeys_the_stability_law_and_the_user() {
+    let mut value = common::settings_value::<2>(1.0 / 24.0, "periodic");
+    value["time_step"] = 0.02.into();
+    let settings = common::parse(&value);
+    let law = settings.time_step_limits(1.0, settings.largest_laplacian_eigenvalue()).penalty;
+    let mut simulation = Simulation::new(settings, taylor_green(24, 0.0), Clock::default(), Some(2)).expect("valid");
+    simulation.advance(20, None).expect("stable");
+    for report in simulation.take_history() {
+        assert_relative_eq!(report.time_step * report.velocity_max, 0.9 * law, max_relative = 1e-12);
+    }
+}
