@@ -1,7 +1,10 @@
-//! Cells at least as wide as the search radius; points are listed by cell with a counting sort.
+//! Cells at least half as wide as the search radius; points are listed by cell with a counting sort.
 
 use crate::particles::Vector;
 use std::ops::Range;
+
+/// Cells that the search radius reaches to either side: narrow cells fit the sphere closer than wide ones.
+const REACH: usize = 2;
 
 /// Cells a point, above which the cells are made wider (a few stray particles must not cost memory).
 const CELLS_PER_POINT: usize = 8;
@@ -43,8 +46,8 @@ impl<const D: usize> Grid<D> {
         };
         let (lower, upper) = points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
         self.origin = lower;
-        // A hair wider than the radius, so that rounding cannot put a neighbour two cells away.
-        let mut width = radius * (1.0 + 1e-9);
+        // A hair wider, so that rounding cannot put a neighbour one cell farther away.
+        let mut width = radius / REACH as f64 * (1.0 + 1e-9);
         loop {
             let counts = (upper - lower).map(|extent| (extent / width).floor() + 1.0);
             if counts.iter().product::<f64>() <= (CELLS_PER_POINT * points.len()).max(64) as f64 {
@@ -92,7 +95,7 @@ impl<const D: usize> Grid<D> {
     #[inline(always)]
     pub fn for_each_run(&self, point: &Vector<D>, mut visit: impl FnMut(&[Vector<D>], &[u32])) {
         let center = self.cell(point);
-        let range = |axis: usize| center[axis].saturating_sub(1)..(center[axis] + 2).min(self.cells[axis]);
+        let range = |axis: usize| center[axis].saturating_sub(REACH)..(center[axis] + REACH + 1).min(self.cells[axis]);
         let first = range(0);
         let mut visit_row = |row: usize| {
             let run = self.run(row * self.cells[0], &first);

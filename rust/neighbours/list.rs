@@ -96,23 +96,23 @@ fn find<const D: usize>(particles: &Particles<D>, grid: &Grid<D>, radius: f64, i
     const BATCH: usize = 32;
     let point = particles.position[i];
     let square = radius * radius;
-    let mut count = 0;
     near.clear();
     grid.for_each_run(&point, |points, indices| {
-        near.resize(count + points.len(), 0);
         for (points, indices) in points.chunks(BATCH).zip(indices.chunks(BATCH)) {
             let mut within = [false; BATCH];
             for (within, candidate) in within.iter_mut().zip(points) {
                 *within = (candidate - point).norm_squared() < square;
             }
             // Every candidate is written, and the next one overwrites it unless it counts: a branch would be mispredicted.
+            let mut found = [0; BATCH];
+            let mut count = 0;
             for (&j, within) in indices.iter().zip(within) {
-                near[count] = j;
+                found[count % BATCH] = j;
                 count += usize::from(within & (j as usize != i));
             }
+            near.extend_from_slice(&found[..count]);
         }
     });
-    near.truncate(count);
 }
 
 #[derive(Debug, Default)]
