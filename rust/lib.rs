@@ -25,6 +25,6 @@ pub mod stencil;
 
 pub use error::{Error, Result};
 pub use particles::{Matrix, ParticleKind, Particles, Vector};
-pub use report::Report;
+pub use report::{Clock, Report};
 pub use settings::Settings;
-pub use simulation::{Clock, Simulation, Snapshot};
+pub use simulation::{Simulation, Snapshot};

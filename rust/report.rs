@@ -1,11 +1,22 @@
-//! What is recorded of a step.
+//! Clock and report: what goes on through a restart, and what is recorded of a step.
 
 use crate::loads::Load;
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles};
 use crate::scheme::{Outcome, Step};
 use crate::settings::{Boundary, Settings};
-use crate::simulation::Clock;
+
+/// Counters that go on through a restart.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Clock {
+    pub time: f64,
+    pub step: u64,
+    /// Mass that has crossed the inlet and outlet planes.
+    pub mass_in: f64,
+    pub mass_out: f64,
+    /// Smallest unused particle id.
+    pub next_id: u64,
+}
 
 #[derive(Clone, Debug)]
 pub struct Report<const D: usize> {

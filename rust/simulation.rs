@@ -8,7 +8,7 @@ use crate::loads::loads;
 use crate::operators;
 use crate::parallel;
 use crate::particles::{Matrix, ParticleKind, Particles, Vector};
-use crate::report::Report;
+use crate::report::{Clock, Report};
 use crate::scheme::{Alsph, Step};
 use crate::settings::{DerivativeFrame, Settings};
 use crate::shifting::shift;
@@ -18,18 +18,6 @@ use std::time::{Duration, Instant};
 
 /// The adaptive time step may not fall below this fraction of the user's: by then the velocity has blown up.
 const SMALLEST_TIME_STEP: f64 = 1e-4;
-
-/// Counters that go on through a restart.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Clock {
-    pub time: f64,
-    pub step: u64,
-    /// Mass that has crossed the inlet and outlet planes.
-    pub mass_in: f64,
-    pub mass_out: f64,
-    /// Smallest unused particle id.
-    pub next_id: u64,
-}
 
 pub struct Simulation<const D: usize> {
     settings: Settings,
