@@ -3,7 +3,6 @@
 //! `cargo bench` prints the throughput in elements a second: pairs for search, stencil and operators, particles for a step.
 
 use alsph::frame::Frame;
-use alsph::operators;
 use alsph::settings::Settings;
 use alsph::{Clock, Matrix, ParticleKind, Particles, Simulation, Vector};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -80,38 +79,38 @@ fn stages(criterion: &mut Criterion) {
         let velocity = &particles.velocity;
         let scalar: Vec<f64> = velocity.iter().map(|u| u[0]).collect();
         let both: Vec<[f64; 2]> = velocity.iter().map(|u| [u[0], u[1]]).collect();
-        let neighbours = &frame.stencil.neighbours;
+        let stencil = &frame.stencil;
         let mut vectors = vec![Vector::zeros(); count];
         let mut scalars = vec![0.0; count];
         let mut matrices = vec![Matrix::zeros(); count];
         group.bench_function(BenchmarkId::new("gradient", count), |b| {
             b.iter(|| {
-                neighbours.for_each_one(
+                stencil.for_each_one(
                     &mut vectors,
                     #[inline(always)]
-                    |i, row, g| *g = operators::gradient(row.all(), &scalar, scalar[i]),
+                    |near, g| *g = near.gradient(&scalar),
                 );
                 black_box(&vectors);
             });
         });
         group.bench_function(BenchmarkId::new("divergence", count), |b| {
             b.iter(|| {
-                neighbours.for_each_one(
+                stencil.for_each_one(
                     &mut scalars,
                     #[inline(always)]
-                    |i, row, d| *d = operators::divergence(row.all(), velocity, velocity[i]),
+                    |near, d| *d = near.divergence(&velocity),
                 );
                 black_box(&scalars);
             });
         });
         group.bench_function(BenchmarkId::new("laplacian and divergence", count), |b| {
             b.iter(|| {
-                neighbours.for_each(
+                stencil.for_each(
                     &mut vectors,
                     &mut scalars,
                     #[inline(always)]
-                    |i, row, l, d| {
-                        (*l, *d) = operators::laplacian_and_divergence(row.all(), velocity, velocity[i]);
+                    |near, l, d| {
+                        (*l, *d) = near.laplacian_and_divergence(velocity, |s| velocity[s]);
                     },
                 );
                 black_box((&vectors, &scalars));
@@ -119,12 +118,12 @@ fn stages(criterion: &mut Criterion) {
         });
         group.bench_function(BenchmarkId::new("gradient and laplacian", count), |b| {
             b.iter(|| {
-                neighbours.for_each(
+                stencil.for_each(
                     &mut vectors,
                     &mut scalars,
                     #[inline(always)]
-                    |i, row, g, l| {
-                        (*g, *l) = operators::gradient_and_laplacian(row.all(), &both, both[i]);
+                    |near, g, l| {
+                        (*g, *l) = near.gradient_and_laplacian(&both);
                     },
                 );
                 black_box((&vectors, &scalars));
@@ -132,10 +131,10 @@ fn stages(criterion: &mut Criterion) {
         });
         group.bench_function(BenchmarkId::new("velocity gradient", count), |b| {
             b.iter(|| {
-                neighbours.for_each_one(
+                stencil.for_each_one(
                     &mut matrices,
                     #[inline(always)]
-                    |i, row, g| *g = operators::velocity_gradient(row.all(), velocity, velocity[i]),
+                    |near, g| *g = near.velocity_gradient(&velocity),
                 );
                 black_box(&matrices);
             });

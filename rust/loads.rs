@@ -82,9 +82,8 @@ fn force_on<const D: usize>(
     let (mut pressure, mut viscous) = (Vector::zeros(), Vector::zeros());
     for pair in stencil.neighbours.row(s).flowing() {
         let f = pair.j();
-        // V_f times the kernel's slope over distance, which is negative.
-        let slope = -f64::from(pair.laplacian) / stencil.laplacian_factor[s];
-        let r_sf = particles.position[s] - particles.position[f];
+        let slope = pair.slope();
+        let r_sf = stencil.position[s] - stencil.position[f];
         pressure -= r_sf * (slope * (particles.pressure[s] + particles.pressure[f]));
         let seen = walls.seen_by(particles, s, f);
         viscous += (particles.velocity[f] - seen) * (-slope * 2.0 * viscosity);

@@ -1,124 +1,175 @@
-//! Derivatives at a particle from a run of its pairs. (15) (16)
+//! Derivatives at a particle. (15) (16)
 //!
-//! Every operator sums weights times differences, so a constant field has derivatives of exactly zero.
+//! Every operator sums weights times differences, so a constant field has derivatives of exactly zero, and corrects the sum
+//! with the tensor made of the same weights, so a linear field has its exact gradient.
 
-use crate::neighbours::Pair;
+use crate::neighbours::{Pair, Row};
 use crate::particles::{Matrix, Vector};
+use crate::stencil::Correction;
 
-/// Σ over the pairs of what `add(pair, field_j, sums)` adds, with two sets of sums in flight. Entries that `add` never
-/// touches cost nothing.
-#[inline(always)]
-fn sum<const D: usize, T>(pairs: &[Pair<D>], field: &[T], add: impl Fn(&Pair<D>, &T, &mut [f64; 4])) -> [f64; 4] {
-    let mut even = [0.0; 4];
-    let mut odd = [0.0; 4];
-    let mut chunks = pairs.chunks_exact(2);
-    for chunk in &mut chunks {
-        add(&chunk[0], &field[chunk[0].j()], &mut even);
-        add(&chunk[1], &field[chunk[1].j()], &mut odd);
+/// A particle and all that its derivatives need beside the field.
+#[derive(Clone, Copy)]
+pub struct Neighbourhood<'a, const D: usize> {
+    pub i: usize,
+    pub row: Row<'a>,
+    /// Positions of the frame.
+    pub position: &'a [Vector<D>],
+    pub correction: &'a Correction<D>,
+}
+
+/// Sums of one pass over the pairs.
+#[derive(Clone, Copy)]
+struct Sums<const D: usize> {
+    /// Σ slope r_ij (f_j − f_i), and for a vector field its outer product.
+    gradient: Vector<D>,
+    tensor: Matrix<D>,
+    /// Σ slope (f_j − f_i).
+    scalar: f64,
+    vector: Vector<D>,
+}
+
+impl<const D: usize> Sums<D> {
+    #[inline(always)]
+    fn zeros() -> Self {
+        Self { gradient: Vector::zeros(), tensor: Matrix::zeros(), scalar: 0.0, vector: Vector::zeros() }
     }
-    if let [last] = chunks.remainder() {
-        add(last, &field[last.j()], &mut even);
-    }
-    std::array::from_fn(|k| even[k] + odd[k])
 }
 
-/// The first D sums as a vector.
-#[inline(always)]
-fn vector<const D: usize>(sums: &[f64; 4]) -> Vector<D> {
-    Vector::from_fn(|k, _| sums[k])
-}
-
-#[inline(always)]
-fn weight<const D: usize>(pair: &Pair<D>, k: usize) -> f64 {
-    f64::from(pair.gradient[k])
-}
-
-/// ∇f. (15)
-#[inline(always)]
-pub fn gradient<const D: usize>(pairs: &[Pair<D>], field: &[f64], at_i: f64) -> Vector<D> {
-    vector(&sum(pairs, field, |pair, f, sums| {
-        for k in 0..D {
-            sums[k] += weight(pair, k) * (f - at_i);
+impl<const D: usize> Neighbourhood<'_, D> {
+    /// Add up `add(slope, slope · r_ij, field_j, sums)` over `pairs`, in two sets of sums at a time. Entries that `add` never
+    /// touches cost nothing.
+    #[inline(always)]
+    fn sum<T>(&self, pairs: &[Pair], field: &[T], add: impl Fn(f64, Vector<D>, &T, &mut Sums<D>)) -> Sums<D> {
+        let here = self.position[self.i];
+        let mut even = Sums::zeros();
+        let mut odd = Sums::zeros();
+        let one = |pair: &Pair, sums: &mut Sums<D>| {
+            let slope = pair.slope();
+            add(slope, (here - self.position[pair.j()]) * slope, &field[pair.j()], sums);
+        };
+        let mut twos = pairs.chunks_exact(2);
+        for two in &mut twos {
+            one(&two[0], &mut even);
+            one(&two[1], &mut odd);
         }
-    }))
-}
-
-/// ∂u_k/∂x_l as the entry (k, l). (15)
-#[inline(always)]
-pub fn velocity_gradient<const D: usize>(pairs: &[Pair<D>], field: &[Vector<D>], at_i: Vector<D>) -> Matrix<D> {
-    let mut gradient = Matrix::zeros();
-    for pair in pairs {
-        let difference = field[pair.j()] - at_i;
-        for l in 0..D {
-            for k in 0..D {
-                gradient[(k, l)] += difference[k] * weight(pair, l);
-            }
+        if let [last] = twos.remainder() {
+            one(last, &mut even);
         }
-    }
-    gradient
-}
-
-/// ∇·u. (15)
-#[inline(always)]
-pub fn divergence<const D: usize>(pairs: &[Pair<D>], field: &[Vector<D>], at_i: Vector<D>) -> f64 {
-    sum(pairs, field, |pair, u, sums| {
-        for k in 0..D {
-            sums[0] += weight(pair, k) * (u[k] - at_i[k]);
-        }
-    })[0]
-}
-
-/// ∇²f, the scalar form of (16).
-#[inline(always)]
-pub fn laplacian<const D: usize>(pairs: &[Pair<D>], field: &[f64], at_i: f64) -> f64 {
-    sum(pairs, field, |pair, f, sums| sums[0] += f64::from(pair.laplacian) * (f - at_i))[0]
-}
-
-/// ∇²u, component by component, and ∇·u.
-#[inline(always)]
-pub fn laplacian_and_divergence<const D: usize>(
-    pairs: &[Pair<D>],
-    field: &[Vector<D>],
-    at_i: Vector<D>,
-) -> (Vector<D>, f64) {
-    let sums = sum(pairs, field, |pair, u, sums| {
-        for k in 0..D {
-            let difference = u[k] - at_i[k];
-            sums[k] += f64::from(pair.laplacian) * difference;
-            sums[3] += weight(pair, k) * difference;
-        }
-    });
-    (vector(&sums), sums[3])
-}
-
-/// ∇f of the first entry of a field of pairs and ∇²g of the second.
-#[inline(always)]
-pub fn gradient_and_laplacian<const D: usize>(pairs: &[Pair<D>], field: &[[f64; 2]], at_i: [f64; 2]) -> (Vector<D>, f64) {
-    let sums = sum(pairs, field, |pair, [f, g], sums| {
-        for k in 0..D {
-            sums[k] += weight(pair, k) * (f - at_i[0]);
-        }
-        sums[3] += f64::from(pair.laplacian) * (g - at_i[1]);
-    });
-    (vector(&sums), sums[3])
-}
-
-/// ∇²u + 2∇(∇·u), which (16) gives as printed: the vector form with the correction tensor. `position` are the
-/// positions that the weights belong to.
-#[inline(always)]
-pub fn vector_laplacian<const D: usize>(
-    pairs: &[Pair<D>],
-    position: &[Vector<D>],
-    field: &[Vector<D>],
-    i: usize,
-) -> Vector<D> {
-    let mut sum = Vector::zeros();
-    for pair in pairs {
-        let r_ij = position[i] - position[pair.j()];
-        let radial = (field[i] - field[pair.j()]).dot(&r_ij) / r_ij.norm_squared().max(f64::MIN_POSITIVE);
-        for l in 0..D {
-            sum[l] += radial * weight(pair, l);
+        Sums {
+            gradient: even.gradient + odd.gradient,
+            tensor: even.tensor + odd.tensor,
+            scalar: even.scalar + odd.scalar,
+            vector: even.vector + odd.vector,
         }
     }
-    sum * (2.0 * (D as f64 + 2.0))
+
+    /// ∇f. (15)
+    #[inline(always)]
+    pub fn gradient(&self, field: &[f64]) -> Vector<D> {
+        let at_i = field[self.i];
+        let sums = self.sum(
+            self.row.all(),
+            field,
+            #[inline(always)]
+            |_, weight, f, sums| sums.gradient += weight * (f - at_i),
+        );
+        self.correction.inverse * sums.gradient
+    }
+
+    /// ∂u_k/∂x_l as the entry (k, l). (15)
+    #[inline(always)]
+    pub fn velocity_gradient(&self, field: &[Vector<D>]) -> Matrix<D> {
+        let at_i = field[self.i];
+        let sums = self.sum(
+            self.row.all(),
+            field,
+            #[inline(always)]
+            |_, weight, u, sums| sums.tensor += (u - at_i) * weight.transpose(),
+        );
+        // α is symmetric.
+        sums.tensor * self.correction.inverse
+    }
+
+    /// ∇·u. (15)
+    #[inline(always)]
+    pub fn divergence(&self, field: &[Vector<D>]) -> f64 {
+        let at_i = field[self.i];
+        let sums = self.sum(
+            self.row.all(),
+            field,
+            #[inline(always)]
+            |_, weight, u, sums| sums.tensor += (u - at_i) * weight.transpose(),
+        );
+        self.corrected_trace(&sums.tensor)
+    }
+
+    /// ∇²f, the scalar form of (16).
+    #[inline(always)]
+    pub fn laplacian(&self, field: &[f64]) -> f64 {
+        let at_i = field[self.i];
+        let sums = self.sum(
+            self.row.all(),
+            field,
+            #[inline(always)]
+            |slope, _, f, sums| sums.scalar += slope * (f - at_i),
+        );
+        self.correction.laplacian * sums.scalar
+    }
+
+    /// ∇²u, component by component, and ∇·u. In the Laplacian solid neighbours show the velocity that `solid` gives.
+    #[inline(always)]
+    pub fn laplacian_and_divergence(&self, field: &[Vector<D>], solid: impl Fn(usize) -> Vector<D>) -> (Vector<D>, f64) {
+        let at_i = field[self.i];
+        let flowing = self.sum(
+            self.row.flowing(),
+            field,
+            #[inline(always)]
+            |slope, weight, u, sums| {
+                let difference = u - at_i;
+                sums.tensor += difference * weight.transpose();
+                sums.vector += difference * slope;
+            },
+        );
+        let (mut tensor, mut vector) = (flowing.tensor, flowing.vector);
+        for pair in self.row.solid() {
+            let weight = (self.position[self.i] - self.position[pair.j()]) * pair.slope();
+            tensor += (field[pair.j()] - at_i) * weight.transpose();
+            vector += (solid(pair.j()) - at_i) * pair.slope();
+        }
+        (vector * self.correction.laplacian, self.corrected_trace(&tensor))
+    }
+
+    /// ∇f of the first entry of a field of pairs and ∇²g of the second.
+    #[inline(always)]
+    pub fn gradient_and_laplacian(&self, field: &[[f64; 2]]) -> (Vector<D>, f64) {
+        let at_i = field[self.i];
+        let sums = self.sum(
+            self.row.all(),
+            field,
+            #[inline(always)]
+            |slope, weight, [f, g], sums| {
+                sums.gradient += weight * (f - at_i[0]);
+                sums.scalar += slope * (g - at_i[1]);
+            },
+        );
+        (self.correction.inverse * sums.gradient, self.correction.laplacian * sums.scalar)
+    }
+
+    /// ∇²u + 2∇(∇·u), which (16) gives as printed: the vector form with the correction tensor.
+    #[inline(always)]
+    pub fn vector_laplacian(&self, field: &[Vector<D>]) -> Vector<D> {
+        let mut sum = Vector::zeros();
+        for pair in self.row.all() {
+            let r_ij = self.position[self.i] - self.position[pair.j()];
+            let radial = (field[self.i] - field[pair.j()]).dot(&r_ij) / r_ij.norm_squared().max(f64::MIN_POSITIVE);
+            sum += r_ij * (radial * pair.slope());
+        }
+        self.correction.inverse * sum * (2.0 * (D as f64 + 2.0))
+    }
+
+    /// Σ_kl α⁻¹_kl T_kl.
+    #[inline(always)]
+    fn corrected_trace(&self, tensor: &Matrix<D>) -> f64 {
+        tensor.component_mul(&self.correction.inverse).sum()
+    }
 }

@@ -202,8 +202,8 @@ fn bytes_per_particle(settings: &str) -> PyResult<f64> {
     let settings = Settings::from_json(settings)?;
     let ratio = settings.support_radius() / settings.particle_spacing;
     let (pairs, pair, fields) = match settings.dimensions {
-        2 => (std::f64::consts::PI * ratio * ratio, size_of::<Pair<2>>(), 16 * size_of::<Vector<2>>()),
-        _ => (4.0 / 3.0 * std::f64::consts::PI * ratio.powi(3), size_of::<Pair<3>>(), 16 * size_of::<Vector<3>>()),
+        2 => (std::f64::consts::PI * ratio * ratio, size_of::<Pair>(), 16 * size_of::<Vector<2>>()),
+        _ => (4.0 / 3.0 * std::f64::consts::PI * ratio.powi(3), size_of::<Pair>(), 16 * size_of::<Vector<3>>()),
     };
     // The rows grow by doubling, so half of their room may be empty.
     Ok(1.5 * pairs * pair as f64 + fields as f64 + 100.0)

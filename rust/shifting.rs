@@ -3,7 +3,6 @@
 use crate::frame::Frame;
 use crate::kernel::{BLOCK, Kernel, Smoothing};
 use crate::neighbours::Row;
-use crate::operators;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{Settings, Shifting};
 use crate::with_kernel;
@@ -42,14 +41,15 @@ fn displacements<K: Kernel, const D: usize>(
 ) -> Vec<(Vector<D>, Vector<D>, f64)> {
     let limit = settings.shift_limit * settings.particle_spacing;
     let mut change = vec![(Vector::zeros(), Vector::zeros(), 0.0); particles.real];
-    frame.stencil.neighbours.for_each_one(
+    frame.stencil.for_each_one(
         &mut change,
         #[inline(always)]
-        |i, row, (shift, du, dp)| {
+        |near, (shift, du, dp)| {
+            let i = near.i;
             if particles.kind[i] != ParticleKind::Fluid {
                 return;
             }
-            let local = Surroundings::of(settings, kernel, particles, row, i);
+            let local = Surroundings::of(settings, kernel, particles, near.row, i);
             let speed = match settings.shifting {
                 Shifting::Xsph => local.relative_speed,
                 _ => settings.shift_coefficient * velocity_max,
@@ -59,9 +59,8 @@ fn displacements<K: Kernel, const D: usize>(
             if length > limit {
                 *shift *= limit / length;
             }
-            let (velocity, pressure) = (&particles.velocity, &particles.pressure);
-            *du = operators::velocity_gradient(row.all(), velocity, velocity[i]) * *shift;
-            *dp = operators::gradient(row.all(), pressure, pressure[i]).dot(shift);
+            *du = near.velocity_gradient(&particles.velocity) * *shift;
+            *dp = near.gradient(&particles.pressure).dot(shift);
         },
     );
     change
@@ -79,7 +78,7 @@ struct Surroundings<const D: usize> {
 
 impl<const D: usize> Surroundings<D> {
     #[inline(always)]
-    fn of<K: Kernel>(settings: &Settings, kernel: Smoothing<K>, particles: &Particles<D>, row: Row<D>, i: usize) -> Self {
+    fn of<K: Kernel>(settings: &Settings, kernel: Smoothing<K>, particles: &Particles<D>, row: Row, i: usize) -> Self {
         let limit = settings.support_radius().powi(2);
         let smallest = 1e-12 * limit;
         let (mut asymmetry, mut relative) = (Vector::zeros(), Vector::zeros());

@@ -5,7 +5,6 @@ use crate::error::{Error, Result, setting};
 use crate::frame::Frame;
 use crate::interpolation::interpolate;
 use crate::loads::loads;
-use crate::operators;
 use crate::parallel;
 use crate::particles::{Matrix, ParticleKind, Particles, Vector};
 use crate::report::{Clock, Report};
@@ -222,11 +221,11 @@ impl<const D: usize> Simulation<D> {
             simulation.prepare();
             let particles = &simulation.particles;
             let mut gradient = vec![Matrix::zeros(); particles.real];
-            simulation.frame.stencil.neighbours.for_each_one(
+            simulation.frame.stencil.for_each_one(
                 &mut gradient,
                 #[inline(always)]
-                |i, row, gradient| {
-                    *gradient = operators::velocity_gradient(row.all(), &particles.velocity, particles.velocity[i]);
+                |near, gradient| {
+                    *gradient = near.velocity_gradient(&particles.velocity);
                 },
             );
             Snapshot { volume: simulation.frame.stencil.volume[..particles.real].to_vec(), velocity_gradient: gradient }

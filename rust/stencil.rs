@@ -1,40 +1,53 @@
 //! The stencil: all that the derivatives need to know of the particle positions of one frame. (14) (17)
 
 use crate::kernel::{BLOCK, Kernel, Smoothing};
-use crate::neighbours::{NeighbourList, Weight};
+use crate::neighbours::{NeighbourList, Row, Slope};
+use crate::operators::Neighbourhood;
 use crate::particles::{Matrix, Particles, Vector};
 use crate::settings::Settings;
 use crate::with_kernel;
 
-/// Correction tensors with a smaller determinant are taken for singular: too few neighbours for a gradient.
-const SINGULAR: f64 = 1e-3;
+/// Inverse correction tensors with a larger norm are taken for singular: too few neighbours for a gradient.
+const SINGULAR: f64 = 1e3;
 
 /// The square of a distance at which every kernel is zero, for the unused entries of a block.
 const FAR: f64 = 1e100;
 
 #[derive(Debug, Default)]
 pub struct Stencil<const D: usize> {
-    pub neighbours: NeighbourList<D>,
+    pub neighbours: NeighbourList,
+    /// Positions that the stencil was evaluated at, of real particles and images.
+    pub position: Vec<Vector<D>>,
     /// V_i = 1 / Σ_j W_ij, of real particles and images.
     pub volume: Vec<f64>,
-    /// 2(D+2) / (2 + tr α_i) of real particles.
-    pub laplacian_factor: Vec<f64>,
+    /// Correction of the real particles.
+    pub correction: Vec<Correction<D>>,
+}
+
+/// What the sums over a particle's neighbours are corrected with.
+#[derive(Clone, Copy, Debug)]
+pub struct Correction<const D: usize> {
+    /// α⁻¹, or the identity where α is singular.
+    pub inverse: Matrix<D>,
+    /// −2(D+2) / (2 + tr α).
+    pub laplacian: f64,
 }
 
 impl<const D: usize> Stencil<D> {
-    /// Volumes and pair weights at the present positions. `mirror` copies the volumes of real particles to their images.
+    /// Volumes, slopes and corrections at the present positions. `mirror` copies the volumes of real particles to their images.
     pub fn evaluate(&mut self, settings: &Settings, particles: &Particles<D>, mirror: impl Fn(&mut [f64])) {
+        self.position.clone_from(&particles.position);
         self.volume.resize(particles.len(), 0.0);
-        self.laplacian_factor.resize(particles.real, 0.0);
-        with_kernel!(settings.kernel, K => self.volumes(Smoothing::<K>::new(settings.smoothing_length(), D), particles));
+        self.correction.resize(particles.real, Correction::of(&Matrix::identity()));
+        with_kernel!(settings.kernel, K => self.volumes(Smoothing::<K>::new(settings.smoothing_length(), D)));
         mirror(&mut self.volume);
-        self.weights(&particles.position);
+        self.corrections();
     }
 
-    /// V_i, and the kernel's slope in the place of the Laplacian weight.
-    fn volumes<K: Kernel>(&mut self, kernel: Smoothing<K>, particles: &Particles<D>) {
-        let position = &particles.position;
-        let real = particles.real;
+    /// V_i, and the slopes without V_j.
+    fn volumes<K: Kernel>(&mut self, kernel: Smoothing<K>) {
+        let position = &self.position;
+        let real = self.correction.len();
         self.neighbours.for_each_mut(
             &mut self.volume[..real],
             &mut vec![(); real],
@@ -49,7 +62,7 @@ impl<const D: usize> Stencil<D> {
                     kernel.evaluate(&squares, &mut values, &mut slopes);
                     sum += values.iter().sum::<f64>();
                     for (slope, pair) in slopes.iter().zip(block) {
-                        pair.laplacian = *slope as Weight;
+                        pair.slope = *slope as Slope;
                     }
                 }
                 *volume = 1.0 / sum;
@@ -57,38 +70,73 @@ impl<const D: usize> Stencil<D> {
         );
     }
 
-    /// The correction tensor (17), and the weights with it applied.
-    fn weights(&mut self, position: &[Vector<D>]) {
-        let volume = &self.volume;
-        let real = self.laplacian_factor.len();
+    /// V_j into the slopes, and the correction tensor (17) from the slopes as stored.
+    fn corrections(&mut self) {
+        let (volume, position) = (&self.volume, &self.position);
+        let real = self.correction.len();
         self.neighbours.for_each_mut(
-            &mut self.laplacian_factor,
+            &mut self.correction,
             &mut vec![(); real],
             #[inline(always)]
-            |i, pairs, factor, ()| {
+            |i, pairs, correction, ()| {
                 let mut alpha = Matrix::<D>::zeros();
-                for pair in pairs.iter() {
-                    let r_ij = position[i] - position[pair.j()];
-                    alpha -= r_ij * r_ij.transpose() * (volume[pair.j()] * f64::from(pair.laplacian));
-                }
-                let correction = correction(&alpha);
-                *factor = 2.0 * (D as f64 + 2.0) / (2.0 + alpha.trace());
                 for pair in pairs {
-                    let slope = volume[pair.j()] * f64::from(pair.laplacian);
-                    let gradient = correction * (position[i] - position[pair.j()]) * slope;
-                    pair.gradient = std::array::from_fn(|k| gradient[k] as Weight);
-                    pair.laplacian = (-*factor * slope) as Weight;
+                    let r_ij = position[i] - position[pair.j()];
+                    pair.slope = (volume[pair.j()] * pair.slope()) as Slope;
+                    alpha -= r_ij * r_ij.transpose() * pair.slope();
                 }
+                *correction = Correction::of(&alpha);
             },
         );
     }
+
+    /// `f(neighbourhood of i, &mut a[i], &mut b[i])` for every real particle, in parallel. Mark `f` `#[inline(always)]`.
+    #[inline(always)]
+    pub fn for_each<A: Send, B: Send>(
+        &self,
+        a: &mut [A],
+        b: &mut [B],
+        f: impl Fn(Neighbourhood<D>, &mut A, &mut B) + Sync + Send,
+    ) {
+        self.neighbours.for_each(
+            a,
+            b,
+            #[inline(always)]
+            |i, row, a, b| f(self.neighbourhood(i, row), a, b),
+        );
+    }
+
+    /// `f(neighbourhood of i, &mut out[i])` for every real particle, in parallel. Mark `f` `#[inline(always)]`.
+    #[inline(always)]
+    pub fn for_each_one<A: Send>(&self, out: &mut [A], f: impl Fn(Neighbourhood<D>, &mut A) + Sync + Send) {
+        // A vector of () takes no memory.
+        let mut nothing = vec![(); out.len()];
+        self.for_each(
+            out,
+            &mut nothing,
+            #[inline(always)]
+            |near, out, ()| f(near, out),
+        );
+    }
+
+    /// The neighbourhood of real particle `i`.
+    pub fn at(&self, i: usize) -> Neighbourhood<'_, D> {
+        self.neighbourhood(i, self.neighbours.row(i))
+    }
+
+    #[inline(always)]
+    fn neighbourhood<'a>(&'a self, i: usize, row: Row<'a>) -> Neighbourhood<'a, D> {
+        Neighbourhood { i, row, position: &self.position, correction: &self.correction[i] }
+    }
 }
 
-/// α⁻¹, or the identity where α is singular.
-fn correction<const D: usize>(alpha: &Matrix<D>) -> Matrix<D> {
-    match alpha.try_inverse() {
-        // Of a symmetric matrix: 1/det is the product of the inverse's eigenvalues, bounded by its norm.
-        Some(inverse) if inverse.norm() < 1.0 / SINGULAR => inverse,
-        _ => Matrix::identity(),
+impl<const D: usize> Correction<D> {
+    #[inline(always)]
+    fn of(alpha: &Matrix<D>) -> Self {
+        let inverse = match alpha.try_inverse() {
+            Some(inverse) if inverse.norm() < SINGULAR => inverse,
+            _ => Matrix::identity(),
+        };
+        Self { inverse, laplacian: -2.0 * (D as f64 + 2.0) / (2.0 + alpha.trace()) }
     }
 }

@@ -12,7 +12,7 @@ mod common;
 fn listed<const D: usize>(frame: &Frame<D>, particles: &Particles<D>) -> Vec<Vec<u32>> {
     (0..particles.real)
         .map(|i| {
-            let mut row: Vec<u32> = frame.stencil.neighbours.row(i).all().iter().map(|pair| pair.index).collect();
+            let mut row: Vec<u32> = frame.stencil.neighbours.row(i).all().iter().map(|pair| pair.j() as u32).collect();
             row.sort_unstable();
             row
         })

@@ -1,16 +1,13 @@
 //! The operators on disordered particles: exact for linear fields, consistent for quadratic ones, in 2-D and 3-D.
 
 use alsph::frame::Frame;
-use alsph::neighbours::{Pair, Weight};
+use alsph::operators::Neighbourhood;
 use alsph::settings::Settings;
-use alsph::{Particles, Vector, operators};
+use alsph::{Particles, Vector};
 use approx::assert_relative_eq;
 use proptest::prelude::*;
 
 mod common;
-
-/// Weights are stored in this precision, and sums of some fifty of them taken.
-const ROUNDING: f64 = 100.0 * Weight::EPSILON as f64;
 
 struct Set<const D: usize> {
     particles: Particles<D>,
@@ -26,8 +23,8 @@ impl<const D: usize> Set<D> {
         Self { particles, frame }
     }
 
-    fn pairs(&self, i: usize) -> &[Pair<D>] {
-        self.frame.stencil.neighbours.row(i).all()
+    fn near(&self, i: usize) -> Neighbourhood<'_, D> {
+        self.frame.stencil.at(i)
     }
 
     fn field<T>(&self, f: impl Fn(&Vector<D>) -> T) -> Vec<T> {
@@ -47,20 +44,16 @@ fn linear_fields_are_exact<const D: usize>(side: usize, disorder: f64, slope: [f
     let gradient = nalgebra::SMatrix::<f64, D, D>::from_fn(|k, l| slope[3 * k + l]);
     let velocity = set.field(|x| gradient * x + Vector::repeat(offset));
     let scalar: Vec<f64> = velocity.iter().map(|u| u[0]).collect();
-    let tolerance = ROUNDING * 10.0;
+    let tolerance = 1e-11;
     for i in 0..set.particles.real {
-        let pairs = set.pairs(i);
-        assert_relative_eq!(
-            operators::gradient(pairs, &scalar, scalar[i]),
-            gradient.row(0).transpose(),
-            epsilon = tolerance
-        );
-        assert_relative_eq!(operators::velocity_gradient(pairs, &velocity, velocity[i]), gradient, epsilon = tolerance);
-        assert_relative_eq!(operators::divergence(pairs, &velocity, velocity[i]), gradient.trace(), epsilon = tolerance);
-        let (_, divergence) = operators::laplacian_and_divergence(pairs, &velocity, velocity[i]);
+        let near = set.near(i);
+        assert_relative_eq!(near.gradient(&scalar), gradient.row(0).transpose(), epsilon = tolerance);
+        assert_relative_eq!(near.velocity_gradient(&velocity), gradient, epsilon = tolerance);
+        assert_relative_eq!(near.divergence(&velocity), gradient.trace(), epsilon = tolerance);
+        let (_, divergence) = near.laplacian_and_divergence(&velocity, |s| velocity[s]);
         assert_relative_eq!(divergence, gradient.trace(), epsilon = tolerance);
         let both: Vec<[f64; 2]> = scalar.iter().map(|&f| [f, f]).collect();
-        let (first, _) = operators::gradient_and_laplacian(pairs, &both, both[i]);
+        let (first, _) = near.gradient_and_laplacian(&both);
         assert_relative_eq!(first, gradient.row(0).transpose(), epsilon = tolerance);
     }
 }
@@ -83,9 +76,9 @@ fn derivatives_of_a_constant_are_exactly_zero() {
     let scalar = set.field(|_| 0.1);
     let vector = set.field(|_| Vector::from([0.1, 1e5]));
     for i in 0..set.particles.real {
-        assert_eq!(operators::gradient(set.pairs(i), &scalar, scalar[i]), Vector::<2>::zeros());
-        assert_eq!(operators::laplacian(set.pairs(i), &scalar, scalar[i]), 0.0);
-        assert_eq!(operators::laplacian_and_divergence(set.pairs(i), &vector, vector[i]), (Vector::<2>::zeros(), 0.0));
+        assert_eq!(set.near(i).gradient(&scalar), Vector::<2>::zeros());
+        assert_eq!(set.near(i).laplacian(&scalar), 0.0);
+        assert_eq!(set.near(i).laplacian_and_divergence(&vector, |s| vector[s]), (Vector::<2>::zeros(), 0.0));
     }
 }
 
@@ -98,9 +91,9 @@ fn laplacian_of_quadratics<const D: usize>(side: usize) {
     let mut seen = 0;
     for i in set.interior(&settings) {
         seen += 1;
-        let laplacian = operators::laplacian(set.pairs(i), &scalar, scalar[i]);
+        let laplacian = set.near(i).laplacian(&scalar);
         assert_relative_eq!(laplacian, 2.0 * D as f64, max_relative = 3e-3);
-        let (vector, _) = operators::laplacian_and_divergence(set.pairs(i), &sheared, sheared[i]);
+        let (vector, _) = set.near(i).laplacian_and_divergence(&sheared, |s| sheared[s]);
         assert_relative_eq!(vector[0], 2.0, max_relative = 3e-3);
         assert_relative_eq!(vector[1], 0.0, epsilon = 2e-3);
     }
@@ -118,18 +111,13 @@ fn printed_vector_laplacian_is_anisotropic_as_measured() {
     // Method, section 2: pure shear u = (y², 0) along an axis 1.89 (exact 2), at 45 degrees 2.11, at h/Δx = 4/3.
     let settings = common::settings::<2>(0.05, "none");
     let set = Set::<2>::new(20, 0.0, &settings);
-    let position = &set.particles.position;
     let i = set.interior(&settings).next().expect("the box has an interior");
     let along = set.field(|x| Vector::from([x[1] * x[1], 0.0]));
-    assert_relative_eq!(operators::vector_laplacian(set.pairs(i), position, &along, i)[0], 1.89, epsilon = 0.01);
+    assert_relative_eq!(set.near(i).vector_laplacian(&along)[0], 1.89, epsilon = 0.01);
     let normal = Vector::from([-1.0, 1.0]) / 2f64.sqrt();
     let tangent = Vector::from([1.0, 1.0]) / 2f64.sqrt();
     let oblique = set.field(|x| tangent * x.dot(&normal).powi(2));
-    assert_relative_eq!(
-        operators::vector_laplacian(set.pairs(i), position, &oblique, i).dot(&tangent),
-        2.11,
-        epsilon = 0.01
-    );
+    assert_relative_eq!(set.near(i).vector_laplacian(&oblique).dot(&tangent), 2.11, epsilon = 0.01);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Solid walls: what velocity and pressure a solid particle shows to the fluid. (20)
 
 use crate::kernel::{Kernel, Smoothing};
-use crate::neighbours::Row;
+use crate::operators::Neighbourhood;
 use crate::particles::{Particles, Vector};
 use crate::settings::{Settings, WallVelocity};
 use crate::with_kernel;
@@ -45,33 +45,31 @@ impl<const D: usize> Walls<D> {
     }
 }
 
-/// Σ W field_j / Σ W over the flowing neighbours of `i`, of the value that `at` gives with r_ij. None without neighbours.
+/// Σ W field_j / Σ W over the flowing neighbours of a particle, of the value that `at` gives for j and r_ij. None without
+/// neighbours.
 pub fn shepard<const D: usize, const N: usize>(
     settings: &Settings,
-    position: &[Vector<D>],
-    row: Row<D>,
-    i: usize,
+    near: Neighbourhood<D>,
     at: impl Fn(usize, Vector<D>) -> [f64; N],
 ) -> Option<[f64; N]> {
-    fn average<K: Kernel, const D: usize, const N: usize>(
-        kernel: Smoothing<K>,
-        position: &[Vector<D>],
-        row: Row<D>,
-        i: usize,
-        at: impl Fn(usize, Vector<D>) -> [f64; N],
-    ) -> Option<[f64; N]> {
-        let mut total = 0.0;
-        let mut sum = [0.0; N];
-        for pair in row.flowing() {
-            let r_ij = position[i] - position[pair.j()];
-            let weight = kernel.value(r_ij.norm());
-            let value = at(pair.j(), r_ij);
-            total += weight;
-            for k in 0..N {
-                sum[k] += weight * value[k];
-            }
+    with_kernel!(settings.kernel, K => average(Smoothing::<K>::new(settings.smoothing_length(), D), near, at))
+}
+
+fn average<K: Kernel, const D: usize, const N: usize>(
+    kernel: Smoothing<K>,
+    near: Neighbourhood<D>,
+    at: impl Fn(usize, Vector<D>) -> [f64; N],
+) -> Option<[f64; N]> {
+    let mut total = 0.0;
+    let mut sum = [0.0; N];
+    for pair in near.row.flowing() {
+        let r_ij = near.position[near.i] - near.position[pair.j()];
+        let weight = kernel.value(r_ij.norm());
+        let value = at(pair.j(), r_ij);
+        total += weight;
+        for k in 0..N {
+            sum[k] += weight * value[k];
         }
-        (total > 0.0).then(|| sum.map(|s| s / total))
     }
-    with_kernel!(settings.kernel, K => average(Smoothing::<K>::new(settings.smoothing_length(), D), position, row, i, at))
+    (total > 0.0).then(|| sum.map(|s| s / total))
 }

@@ -6,4 +6,4 @@ mod list;
 
 pub use brute_force::brute_force_neighbours;
 pub use grid::Grid;
-pub use list::{NeighbourList, Pair, Row, Weight};
+pub use list::{NeighbourList, Pair, Row, Slope};

@@ -2,7 +2,6 @@
 
 use crate::boundary::{Walls, shepard};
 use crate::frame::Frame;
-use crate::operators;
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{DerivativeFrame, Settings, VelocityLaplacian, WallPressure, WallVelocity};
@@ -98,18 +97,14 @@ impl<const D: usize> Alsph<D> {
         let velocity = &particles.velocity;
         let vector_form = step.settings.velocity_laplacian == VelocityLaplacian::Vector;
         let walls = &*walls;
-        frame.stencil.neighbours.for_each(
+        frame.stencil.for_each(
             &mut self.divergence_pressure[..real],
             &mut self.velocity_laplacian,
             #[inline(always)]
-            |i, row, [divergence, _], laplacian| {
-                (*laplacian, *divergence) = operators::laplacian_and_divergence(row.flowing(), velocity, velocity[i]);
-                *divergence += operators::divergence(row.solid(), velocity, velocity[i]);
-                for pair in row.solid() {
-                    *laplacian += (walls.seen_by(particles, pair.j(), i) - velocity[i]) * f64::from(pair.laplacian);
-                }
+            |near, [divergence, _], laplacian| {
+                (*laplacian, *divergence) = near.laplacian_and_divergence(velocity, |s| walls.seen_by(particles, s, near.i));
                 if vector_form {
-                    *laplacian = operators::vector_laplacian(row.all(), &particles.position, velocity, i);
+                    *laplacian = near.vector_laplacian(velocity);
                 }
             },
         );
@@ -124,12 +119,13 @@ impl<const D: usize> Alsph<D> {
         let paper_walls = step.settings.wall_pressure == WallPressure::Paper;
         let fields = &self.divergence_pressure;
         let (initial, laplacian) = (&self.velocity_initial, &self.velocity_laplacian);
-        frame.stencil.neighbours.for_each(
+        frame.stencil.for_each(
             &mut self.velocity_star[..real],
             &mut self.pressure_laplacian,
             #[inline(always)]
-            |i, row, star, pressure_laplacian| {
-                let (penalty, p) = operators::gradient_and_laplacian(row.all(), fields, fields[i]);
+            |near, star, pressure_laplacian| {
+                let i = near.i;
+                let (penalty, p) = near.gradient_and_laplacian(fields);
                 let still = match particles.kind[i] {
                     ParticleKind::Outlet => true,
                     ParticleKind::Solid => !paper_walls,
@@ -153,15 +149,16 @@ impl<const D: usize> Alsph<D> {
         let Step { settings, time_step: dt, penalty } = step;
         let paper_walls = settings.wall_pressure == WallPressure::Paper;
         let (star, initial, laplacian) = (&self.velocity_star, &self.velocity_initial, &self.pressure_laplacian);
-        frame.stencil.neighbours.for_each_one(
+        frame.stencil.for_each_one(
             &mut pressure[..*real],
             #[inline(always)]
-            |i, row, p| {
+            |near, p| {
+                let i = near.i;
                 let solid = kind[i] == ParticleKind::Solid;
                 if kind[i] == ParticleKind::Outlet {
                     *p = 0.0;
                 } else if !solid || paper_walls {
-                    let divergence = operators::divergence(row.all(), star, star[i]);
+                    let divergence = near.divergence(star);
                     *p -= penalty * (settings.density * divergence - dt * laplacian[i]);
                 }
                 if solid && paper_walls {
@@ -184,12 +181,12 @@ impl<const D: usize> Alsph<D> {
         let Particles { real, kind, pressure, velocity, .. } = particles;
         let (kind, pressure, star) = (&*kind, &*pressure, &self.velocity_star);
         let factor = step.time_step / step.settings.density;
-        frame.stencil.neighbours.for_each_one(
+        frame.stencil.for_each_one(
             &mut velocity[..*real],
             #[inline(always)]
-            |i, row, u| {
-                if kind[i] == ParticleKind::Fluid {
-                    *u = star[i] - operators::gradient(row.all(), pressure, pressure[i]) * factor;
+            |near, u| {
+                if kind[near.i] == ParticleKind::Fluid {
+                    *u = star[near.i] - near.gradient(pressure) * factor;
                 }
             },
         );
@@ -234,14 +231,15 @@ fn extrapolate_wall_velocity<const D: usize>(
     if settings.wall_velocity != WallVelocity::Adami {
         return;
     }
-    let Particles { real, kind, position, velocity, .. } = particles;
+    let Particles { real, kind, velocity, .. } = particles;
     walls.viscous_velocity.resize(particles.len(), Vector::zeros());
-    frame.stencil.neighbours.for_each_one(
+    frame.stencil.for_each_one(
         &mut walls.viscous_velocity[..*real],
         #[inline(always)]
-        |i, row, seen| {
+        |near, seen| {
+            let i = near.i;
             if kind[i] == ParticleKind::Solid {
-                let average = shepard(settings, position, row, i, |j, _| velocity[j].into());
+                let average = shepard(settings, near, |j, _| velocity[j].into());
                 *seen = average.map_or(velocity[i], |average| velocity[i] * 2.0 - Vector::from(average));
             }
         },
@@ -253,15 +251,16 @@ fn extrapolate_wall_velocity<const D: usize>(
 /// 2012, eq. 27; bodies do not accelerate).
 fn extrapolate_wall_pressure<const D: usize>(settings: &Settings, particles: &mut Particles<D>, frame: &Frame<D>) {
     let gravity = Vector::<D>::from_column_slice(&settings.body_force);
-    let Particles { real, kind, position, pressure, .. } = particles;
+    let Particles { real, kind, pressure, .. } = particles;
     let fluid = pressure.clone();
-    frame.stencil.neighbours.for_each_one(
+    frame.stencil.for_each_one(
         &mut pressure[..*real],
         #[inline(always)]
-        |i, row, p| {
+        |near, p| {
+            let i = near.i;
             if kind[i] == ParticleKind::Solid {
                 let at = |j: usize, r_ij: Vector<D>| [fluid[j] + settings.density * gravity.dot(&r_ij)];
-                *p = shepard(settings, position, row, i, at).map_or(0.0, |[average]| average);
+                *p = shepard(settings, near, at).map_or(0.0, |[average]| average);
             }
         },
     );
