@@ -98,7 +98,7 @@ fn stages(criterion: &mut Criterion) {
                 stencil.for_each_one(
                     &mut scalars,
                     #[inline(always)]
-                    |near, d| *d = near.divergence(&velocity),
+                    |near, d| *d = near.divergence(velocity),
                 );
                 black_box(&scalars);
             });
@@ -134,7 +134,7 @@ fn stages(criterion: &mut Criterion) {
                 stencil.for_each_one(
                     &mut matrices,
                     #[inline(always)]
-                    |near, g| *g = near.velocity_gradient(&velocity),
+                    |near, g| *g = near.velocity_gradient(velocity),
                 );
                 black_box(&matrices);
             });

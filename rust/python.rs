@@ -347,9 +347,12 @@ fn snapshot<'py, const D: usize>(
     Ok((dict, snapshot.velocity_gradient))
 }
 
+/// A name and the number that it stands for in a report.
+type Column<const D: usize> = (&'static str, fn(&Report<D>) -> f64);
+
 fn history<'py, const D: usize>(py: Python<'py>, reports: &[Report<D>], bodies: usize) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    let numbers: [(&str, fn(&Report<D>) -> f64); 12] = [
+    let numbers: [Column<D>; 12] = [
         ("time", |r| r.clock.time),
         ("time_step", |r| r.time_step),
         ("divergence_max", |r| r.outcome.divergence_max),
