@@ -3,6 +3,7 @@
 use crate::frame::Frame;
 use crate::kernel::{BLOCK, Kernel, Smoothing};
 use crate::neighbours::Row;
+use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{Settings, Shifting};
 use crate::with_kernel;
@@ -23,11 +24,10 @@ pub fn shift<const D: usize>(
         let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
         displacements(settings, kernel, particles, frame, time_step, velocity_max)
     });
-    for (i, (displacement, velocity, pressure)) in change.into_iter().enumerate() {
-        particles.position[i] += displacement;
-        particles.velocity[i] += velocity;
-        particles.pressure[i] += pressure;
-    }
+    let Particles { real, position, velocity, pressure, .. } = particles;
+    parallel::for_each(&mut position[..*real], |i, r| *r += change[i].0);
+    parallel::for_each(&mut velocity[..*real], |i, u| *u += change[i].1);
+    parallel::for_each(&mut pressure[..*real], |i, p| *p += change[i].2);
 }
 
 /// δr, δr·∇u and δr·∇p of every real particle.

@@ -12,6 +12,7 @@ use crate::scheme::{Alsph, Step};
 use crate::settings::{DerivativeFrame, Settings};
 use crate::shifting::shift;
 use rayon::ThreadPool;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -163,7 +164,8 @@ impl<const D: usize> Simulation<D> {
     /// Largest velocity modulus of the particles: what u_max stands for in r_AL and in the stability law.
     fn velocity_max(&self) -> f64 {
         let velocity = &self.particles.velocity[..self.particles.real];
-        velocity.iter().map(|u| u.norm_squared()).fold(0.0, f64::max).sqrt()
+        let largest = |range: Range<usize>| velocity[range].iter().map(|u| u.norm_squared()).fold(0.0, f64::max);
+        parallel::reduce(velocity.len(), largest, f64::max).unwrap_or(0.0).sqrt()
     }
 
     /// Δt of the next step.
@@ -187,16 +189,17 @@ impl<const D: usize> Simulation<D> {
     fn check_fields(&self, time_step: f64) -> Result<()> {
         let particles = &self.particles;
         let fastest = self.settings.particle_spacing / time_step;
-        for i in (0..particles.real).filter(|&i| particles.kind[i] != ParticleKind::Solid) {
-            let speed = particles.velocity[i].norm();
-            if speed.is_nan() || speed > fastest {
-                return Err(self.diverged(i, "velocity", speed));
+        let bad = |i: usize| {
+            let (speed, pressure) = (particles.velocity[i].norm(), particles.pressure[i]);
+            if particles.kind[i] != ParticleKind::Solid && (speed.is_nan() || speed > fastest) {
+                return Some((i, "velocity", speed));
             }
-            if !particles.pressure[i].is_finite() {
-                return Err(self.diverged(i, "pressure", particles.pressure[i]));
-            }
+            (!pressure.is_finite()).then_some((i, "pressure", pressure))
+        };
+        match parallel::reduce(particles.real, |mut range| range.find_map(bad), Option::or).flatten() {
+            Some((i, field, value)) => Err(self.diverged(i, field, value)),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn diverged(&self, i: usize, field: &'static str, value: f64) -> Error {

@@ -171,9 +171,8 @@ impl<const D: usize> Alsph<D> {
             extrapolate_wall_pressure(settings, particles, frame);
         }
         frame.images.scalars(&mut particles.pressure);
-        for (fields, &p) in self.divergence_pressure.iter_mut().zip(&particles.pressure) {
-            fields[1] = p;
-        }
+        let pressure = &particles.pressure;
+        parallel::for_each(&mut self.divergence_pressure, |i, fields| fields[1] = pressure[i]);
     }
 
     /// u^{m+1} (11). Buffers and solids keep their velocities.
@@ -197,12 +196,12 @@ impl<const D: usize> Alsph<D> {
     pub fn advance_positions(&self, step: Step, particles: &mut Particles<D>, frame: &Frame<D>) {
         let Particles { real, kind, body, velocity, position, .. } = particles;
         let bodies = &step.settings.bodies;
-        for i in 0..*real {
+        parallel::for_each(&mut position[..*real], |i, r| {
             let fixed = kind[i] == ParticleKind::Solid && !bodies[body[i] as usize].moves;
             if !fixed {
-                position[i] = self.position_initial[i] + (self.velocity_initial[i] + velocity[i]) * (0.5 * step.time_step);
+                *r = self.position_initial[i] + (self.velocity_initial[i] + velocity[i]) * (0.5 * step.time_step);
             }
-        }
+        });
         frame.images.positions(position);
     }
 
