@@ -19,8 +19,8 @@ pub fn interpolate<const D: usize>(
     }
     let radius = settings.support_radius();
     let mut near = Vec::new();
-    grid.for_each_run(point, |_, run| {
-        near.extend(run.iter().map(|&j| j as usize).filter(|&j| {
+    grid.for_each_run(point, |run| {
+        near.extend(run.indices.iter().map(|&j| j as usize).filter(|&j| {
             particles.kind[j] != ParticleKind::Solid && (particles.position[j] - point).norm_squared() < radius * radius
         }));
     });

@@ -90,6 +90,20 @@ impl<const D: usize> Neighbourhood<'_, D> {
         sums.tensor * self.correction.inverse
     }
 
+    /// ∂u_k/∂x_l as the entry (k, l), and ∇p. (15)
+    #[inline(always)]
+    pub fn velocity_and_pressure_gradient(&self, velocity: &[Vector<D>], pressure: &[f64]) -> (Matrix<D>, Vector<D>) {
+        let (u_i, p_i) = (velocity[self.i], pressure[self.i]);
+        let mut tensor = Matrix::zeros();
+        let mut gradient = Vector::zeros();
+        for pair in self.row.all() {
+            let weight = (self.position[self.i] - self.position[pair.j()]) * pair.slope();
+            tensor += (velocity[pair.j()] - u_i) * weight.transpose();
+            gradient += weight * (pressure[pair.j()] - p_i);
+        }
+        (tensor * self.correction.inverse, self.correction.inverse * gradient)
+    }
+
     /// ∇·u. (15)
     #[inline(always)]
     pub fn divergence(&self, field: &[Vector<D>]) -> f64 {

@@ -59,8 +59,10 @@ fn displacements<K: Kernel, const D: usize>(
             if length > limit {
                 *shift *= limit / length;
             }
-            *du = near.velocity_gradient(&particles.velocity) * *shift;
-            *dp = near.gradient(&particles.pressure).dot(shift);
+            let (velocity_gradient, pressure_gradient) =
+                near.velocity_and_pressure_gradient(&particles.velocity, &particles.pressure);
+            *du = velocity_gradient * *shift;
+            *dp = pressure_gradient.dot(shift);
         },
     );
     change

@@ -69,8 +69,8 @@ fn refill<const D: usize>(
     let mut position = particles.position[i];
     position[axis] -= inward * settings.buffer_length();
     let mut nearest = (f64::INFINITY, particles.pressure[i]);
-    grid.for_each_run(&position, |_, run| {
-        for &j in run {
+    grid.for_each_run(&position, |run| {
+        for &j in run.indices {
             let j = j as usize;
             if j < particles.real && particles.kind[j] == ParticleKind::Inlet {
                 let distance = (particles.position[j] - position).norm_squared();

@@ -18,9 +18,17 @@ pub struct Grid<const D: usize> {
     starts: Vec<u32>,
     /// Point indices sorted by cell (first direction fastest), then by index.
     items: Vec<u32>,
-    /// The points in the order of `items`.
-    points: Vec<Vector<D>>,
+    /// The coordinates of the points in the order of `items`, one array a direction.
+    coordinates: [Vec<f64>; D],
     cell_of: Vec<u32>,
+}
+
+/// Points in neighbouring cells.
+#[derive(Clone, Copy)]
+pub struct Run<'a, const D: usize> {
+    pub indices: &'a [u32],
+    /// One array a direction.
+    pub coordinates: [&'a [f64]; D],
 }
 
 impl<const D: usize> Default for Grid<D> {
@@ -31,7 +39,7 @@ impl<const D: usize> Default for Grid<D> {
             cells: [1; D],
             starts: vec![0, 0],
             items: Vec::new(),
-            points: Vec::new(),
+            coordinates: std::array::from_fn(|_| Vec::new()),
             cell_of: Vec::new(),
         }
     }
@@ -81,8 +89,10 @@ impl<const D: usize> Grid<D> {
         // Each start has moved on to its end, which is the next cell's start.
         self.starts.rotate_right(1);
         self.starts[0] = 0;
-        self.points.clear();
-        self.points.extend(self.items.iter().map(|&item| points[item as usize]));
+        for (axis, coordinates) in self.coordinates.iter_mut().enumerate() {
+            coordinates.clear();
+            coordinates.extend(self.items.iter().map(|&item| points[item as usize][axis]));
+        }
     }
 
     /// Point indices sorted by cell, then by index.
@@ -90,16 +100,18 @@ impl<const D: usize> Grid<D> {
         &self.items
     }
 
-    /// Call `visit` with each run of points, and their indices, that may lie within the search radius of `point`, in a fixed
-    /// order.
+    /// Call `visit` with each run of points that may lie within the search radius of `point`, in a fixed order.
     #[inline(always)]
-    pub fn for_each_run(&self, point: &Vector<D>, mut visit: impl FnMut(&[Vector<D>], &[u32])) {
+    pub fn for_each_run(&self, point: &Vector<D>, mut visit: impl FnMut(Run<D>)) {
         let center = self.cell(point);
         let range = |axis: usize| center[axis].saturating_sub(REACH)..(center[axis] + REACH + 1).min(self.cells[axis]);
         let first = range(0);
         let mut visit_row = |row: usize| {
             let run = self.run(row * self.cells[0], &first);
-            visit(&self.points[run.clone()], &self.items[run]);
+            visit(Run {
+                indices: &self.items[run.clone()],
+                coordinates: self.coordinates.each_ref().map(|x| &x[run.clone()]),
+            });
         };
         match D {
             2 => range(1).for_each(&mut visit_row),

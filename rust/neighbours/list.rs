@@ -114,19 +114,23 @@ fn find<'a, const D: usize>(
     let point = particles.position[i];
     let square = radius * radius;
     let mut count = 0;
-    grid.for_each_run(&point, |points, indices| {
-        if near.len() < count + points.len() {
-            near.resize(2 * (count + points.len()), 0);
+    grid.for_each_run(&point, |run| {
+        let length = run.indices.len();
+        if near.len() < count + length {
+            near.resize(2 * (count + length), 0);
         }
-        for (points, indices) in points.chunks(BATCH).zip(indices.chunks(BATCH)) {
-            let mut within = [false; BATCH];
-            for (within, candidate) in within.iter_mut().zip(points) {
-                *within = (candidate - point).norm_squared() < square;
+        for start in (0..length).step_by(BATCH) {
+            let end = (start + BATCH).min(length);
+            let mut squares = [0.0; BATCH];
+            for axis in 0..D {
+                for (sum, x) in squares.iter_mut().zip(&run.coordinates[axis][start..end]) {
+                    *sum += (x - point[axis]) * (x - point[axis]);
+                }
             }
             // Every candidate is written, and the next one overwrites it unless it counts: a branch would be mispredicted.
-            for (&j, within) in indices.iter().zip(within) {
+            for (&j, distance) in run.indices[start..end].iter().zip(squares) {
                 near[count] = j;
-                count += usize::from(within & (j as usize != i));
+                count += usize::from((distance < square) & (j as usize != i));
             }
         }
     });
