@@ -8,9 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
-from scipy.stats import linregress
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from alsph.geometry import FloatArray
 
@@ -112,7 +110,8 @@ def batch_means(time: FloatArray, values: FloatArray, edges: FloatArray) -> Floa
     -------
     ndarray, shape (k, ...)
     """
-    integral = cumulative_trapezoid(values, time, axis=0, initial=0)
+    areas = 0.5 * (np.diff(time) * (values[1:] + values[:-1]).T).T
+    integral = np.concatenate([np.zeros_like(areas[:1]), np.cumsum(areas, axis=0)])
     right = np.clip(np.searchsorted(time, edges), 1, len(time) - 1)
     elapsed, step = edges - time[right - 1], time[right] - time[right - 1]
     elapsed, step = (a.reshape(-1, *[1] * (values.ndim - 1)) for a in (elapsed, step))
@@ -217,7 +216,7 @@ def _from_batches(means: FloatArray, widths: FloatArray, note: str) -> Estimate:
         count = len(means) // size
         if count >= (2 if size == 1 else 4):
             batches = means[len(means) - count * size :].reshape(count, size).mean(axis=1)
-            errors.append(batches.std(ddof=1) / np.sqrt(count) * student.ppf(0.8413, count - 1))
+            errors.append(batches.std(ddof=1) / np.sqrt(count) * stdtrit(count - 1, 0.8413))
     return Estimate(value, float(np.nanmax(errors)) if len(errors) > 1 else np.nan, note)
 
 
@@ -250,12 +249,18 @@ def strouhal(time: FloatArray, lift: FloatArray, window: Window) -> Estimate:
     """
     if window.periods < 2:
         return Estimate(np.nan, note=window.rule)
-    fit = linregress(np.arange(window.periods + 1), window.edges)
-    crossing = 1 / float(fit.slope)
+    period, error = _slope(np.arange(window.periods + 1), window.edges)
+    crossing = 1 / period
     peak = spectral_peak(time, lift, window.start, window.end, crossing)
-    uncertainty = np.hypot(float(fit.stderr) * crossing**2, peak - crossing)
+    uncertainty = np.hypot(error * crossing**2, peak - crossing)
     note = f"spectrum {peak:.5f}, zero crossings {crossing:.5f}, {window.periods} periods; {window.rule}"
     return Estimate(peak, float(uncertainty), note)
+
+
+def _slope(x: NDArray[Any], y: FloatArray) -> tuple[float, float]:
+    """Slope of the straight line fitted to three or more points, and its standard error."""
+    line, covariance = np.polyfit(x, y, 1, cov=True)
+    return float(line[0]), float(np.sqrt(covariance[0, 0]))
 
 
 def spectral_peak(time: FloatArray, signal: FloatArray, start: float, end: float, guess: float) -> float:
@@ -327,5 +332,5 @@ def decay_rate(time: FloatArray, energy: FloatArray) -> Estimate:
     """
     if len(time) < 3 or not np.all(energy > 0):
         return Estimate(np.nan, note="a decay rate needs three or more positive values")
-    fit = linregress(time, np.log(energy))
-    return Estimate(-float(fit.slope), float(fit.stderr))
+    slope, error = _slope(time, np.log(energy))
+    return Estimate(-slope, error)
