@@ -50,6 +50,8 @@ def test_summary_and_representations(folder):
     summary = run.summary()
     assert summary["status"] == "finished" and summary["steps"] == len(run.history["time"])
     assert summary["steps ended by the iteration cap, %"] == pytest.approx(75)
+    assert (summary["Reynolds number"], summary["resolution, D/Δx"]) == (200, 10)
+    assert "message" not in summary and "mean drag coefficient, reference" not in summary
     assert repr(run).endswith("cylinder, finished, tU/D = 60.03)")
     assert "mean drag coefficient</th><td>1.4" in run._repr_html_()
 

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from alsph import analysis, plotting, reading, sampling
+from alsph import analysis, plotting, reading, reference, sampling
 from alsph.analysis import Estimate, Window
-from alsph.errors import RunFolderError
+from alsph.errors import ConfigError, RunFolderError
 from alsph.geometry import FloatArray
+from alsph.progress import duration
 from alsph.reading import Snapshot
+from alsph.reference import Reference
 
 
 @dataclass(frozen=True)
@@ -106,6 +108,11 @@ class Run:
     def spacing(self) -> float:
         """Particle spacing Δx [D]."""
         return 1.0 / float(self.case["resolution"])
+
+    @cached_property
+    def reference(self) -> Reference | None:
+        """Independent reference solution of the same flow, None where alsph has none."""
+        return reference.find(self.case)
 
     @cached_property
     def history(self) -> dict[str, FloatArray]:
@@ -200,9 +207,13 @@ class Run:
 
         Raises
         ------
+        ConfigError
+            If the time is no number.
         RunFolderError
             If there is no complete snapshot.
         """
+        if time is not None and not np.isfinite(time):
+            raise ConfigError(f"time = {time}: must be a finite number")
         if len(self.times) == 0:
             raise RunFolderError(f"{self.path}: no snapshot yet; wait for the first one or lower output_interval")
         index = len(self.times) - 1 if time is None else int(np.abs(self.times - time).argmin())
@@ -237,11 +248,18 @@ class Run:
         return sampling.control_volume(*fields, box, self.spacing, 1.0, viscosity)
 
     def summary(self) -> dict[str, Any]:
-        """Return the run's main results by name; ``str()`` of each value is fit to be read."""
+        """Return the run's main results by name, each followed by its reference value where there is one.
+
+        ``str()`` of each value is fit to be read.
+        """
         steps = len(self.history["time"])
         results: dict[str, Any] = {
             "case": self.case.get("case", "unknown"),
+            "Reynolds number": Estimate(self.case["reynolds"]),
+            "resolution, D/Δx": self.case["resolution"],
             "status": self.status,
+            "message": self.info.get("message", ""),
+            "computing time": duration(self.info.get("seconds", 0)),
             "time reached, tU/D": Estimate(self.history["time"][-1] if steps else 0.0),
             "steps": steps,
             "steps ended by the iteration cap, %": self._capped(),
@@ -259,7 +277,21 @@ class Run:
                 "lift coefficient amplitude": self.lift.amplitude,
                 "Strouhal number": self.strouhal,
             }
-        return results | {"mean velocity divergence, |∇·u| D/U": self.divergence.mean}
+        if self.case.get("case") == "taylor_green":
+            rate = analysis.decay_rate(self.history["time"], self.history.get("kinetic_energy", np.empty(0)))
+            results["decay rate of the kinetic energy, U/D"] = rate
+        results["mean velocity divergence, |∇·u| D/U"] = self.divergence.mean
+        return self._with_reference({name: value for name, value in results.items() if value != ""})
+
+    def _with_reference(self, results: dict[str, Any]) -> dict[str, Any]:
+        """Put the reference values beside the results of the same name."""
+        expected = self.reference.results if self.reference else {}
+        rows: dict[str, Any] = {}
+        for name, value in results.items():
+            rows[name] = value
+            if name in expected:
+                rows[f"{name}, reference"] = Estimate(expected[name])
+        return rows
 
     def _capped(self) -> Estimate:
         """Percentage of the steps that the iteration cap ended, not the tolerance."""
@@ -298,7 +330,12 @@ class Run:
     def plot_pressure_coefficient(
         self, path: str | Path | None = None, reference: tuple[FloatArray, FloatArray] | None = None
     ) -> Figure:
-        """Figure of C_p(θ) with an optional reference curve (θ in degrees, C_p); saved if `path` is given."""
+        """Figure of C_p(θ) and a reference curve (θ in degrees, C_p); saved if `path` is given.
+
+        Without a `reference`, that of :attr:`reference` is drawn where there is one.
+        """
+        if reference is None and self.reference:
+            reference = self.reference.pressure_coefficient
         return _saved(plotting.pressure_coefficient(self.pressure_coefficient, reference), path)
 
     def plot_history(self, path: str | Path | None = None) -> Figure:
