@@ -48,9 +48,19 @@ def test_a_picture_of_fluid_without_a_body_and_without_variation():
     assert plotting.field(still, "vorticity", 0.1).axes[0].images[0].get_clim() == (-1, 1)
 
 
+def test_a_field_in_few_pixels_has_a_scale_of_its_own():
+    picture = np.full((100, 100), 1e-3)
+    picture[:5, :5] = 4.0
+    assert plotting._limit(picture) == pytest.approx(4.0, abs=0.51)
+    picture[:] = np.linspace(0, 1, 10_000).reshape(100, 100)
+    assert plotting._limit(picture) == 1.0
+
+
 def test_fields_that_cannot_be_drawn(run):
     with pytest.raises(ConfigError, match="unknown field 'vortcity'; did you mean 'vorticity'"):
         run.plot_field("vortcity")
+    with pytest.raises(ConfigError, match="time = nan: must be a finite number"):
+        run.plot_field("pressure", time=np.nan)
     solid = Snapshot(0.0, np.zeros((1, 3)), np.zeros((1, 3)), *np.zeros((3, 1)), np.zeros(1, np.uint8))
     with pytest.raises(ConfigError, match="2-D only"):
         plotting.field(solid, "vorticity", 0.1)

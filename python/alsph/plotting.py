@@ -44,6 +44,19 @@ FIELDS = {
 }
 
 
+def field_style(name: str) -> FieldStyle:
+    """Return how a field is drawn.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such field.
+    """
+    if name not in FIELDS:
+        raise ConfigError(f"unknown field '{name}'; {suggest(name, FIELDS)}")
+    return FIELDS[name]
+
+
 def field(
     snapshot: Snapshot,
     name: str,
@@ -70,18 +83,16 @@ def field(
     ConfigError
         If there is no such field, or the snapshot is in 3-D.
     """
-    if name not in FIELDS:
-        raise ConfigError(f"unknown field '{name}'; {suggest(name, FIELDS)}")
+    style = field_style(name)
     if snapshot.position.shape[1] != 2:
         raise ConfigError("pictures are drawn in 2-D only; open particles.vtkhdf in ParaView")
-    style = FIELDS[name]
     values = np.linalg.norm(snapshot.velocity, axis=1) if name == "velocity" else getattr(snapshot, name)
     left, right, bottom, top = extent = view or _extent(snapshot, spacing)
     picture, body = _raster(snapshot, values, spacing, extent)
     limit = limit or _limit(picture)
     width = 9.0
     figure = Figure(
-        figsize=(width, max(2.5, 0.86 * width * (top - bottom) / (right - left) + 0.9)), layout="constrained"
+        figsize=(width, max(2.5, 0.81 * width * (top - bottom) / (right - left) + 0.75)), layout="compressed"
     )
     axes = figure.subplots()
     lowest = -limit if style.signed else 0.0
@@ -123,11 +134,14 @@ def _raster(
 
 
 def _limit(picture: FloatArray) -> float:
-    """Return a round end for the colour scale that all but one per cent of the pixels stay within."""
+    """Return a round end for the colour scale.
+
+    All but one per cent of the pixels stay within it, or more where the field is concentrated in fewer than that.
+    """
     size = np.abs(picture[np.isfinite(picture)])
-    largest = float(np.percentile(size, 99)) if size.size else 0.0
-    if largest <= 0:
+    if not size.any():
         return 1.0
+    largest = max(float(np.percentile(size, 99)), float((size**2).sum() / size.sum()))
     unit = 10.0 ** np.floor(np.log10(largest))
     return float(np.ceil(largest / unit * 2) / 2 * unit)
 
@@ -234,7 +248,7 @@ def history(run: Run) -> Figure:
         if "nabla" in label:
             axes.set_yscale("log")
         elif "change" not in label:
-            axes.set_ylim(bottom=0)
+            axes.set_ylim(0, 1.1 * axes.dataLim.ymax if run.history["time"].size else None)
         _finish(axes, run.window)
     axes.set_xlabel(TIME_LABEL)
     return figure
