@@ -1,7 +1,9 @@
 import json
 import os
 import shutil
+import signal
 import threading
+import time
 
 import alsph
 import h5py
@@ -10,7 +12,7 @@ import pytest
 from alsph import config, io
 from alsph.cases import Cylinder, TaylorGreen
 from alsph.errors import ConfigError, RunFolderError, SolverError
-from alsph.run import resume, start
+from alsph.run import _interruptible, resume, start
 
 HISTORY_COLUMNS = (
     "step time time_step iterations converged divergence_max divergence_mean divergence_sum velocity_max "
@@ -71,8 +73,8 @@ def test_run_without_a_body(tmp_path):
 def test_resumed_run_is_the_uninterrupted_run_to_the_last_bit(small, tmp_path):
     whole = small.run(tmp_path / "whole", until=0.2, output_interval=0.1, progress=False)
     part = small.run(tmp_path / "part", until=0.1, output_interval=0.1, progress=False)
-    with pytest.raises(RunFolderError, match="has reached its end"):
-        resume(part.path, progress=False)
+    with pytest.raises(RunFolderError, match="has reached its end.*--until 0.2"):
+        resume(part.path, until=0.05, progress=False)
     part = resume(part.path, until=0.2, threads=1, progress=False)
     assert (part.path / "history.csv").read_text() == (whole.path / "history.csv").read_text()
     assert same(*(by_id(io.RunFolder(run.path).read_checkpoint()) for run in (whole, part)))
@@ -123,8 +125,11 @@ def test_disk_that_fills_up_leaves_a_folder_that_resumes(small, tmp_path, monkey
 def test_nothing_is_created_for_a_run_that_cannot_start(small, tmp_path):
     with pytest.raises(ConfigError, match="GiB of memory"):
         Cylinder(resolution=10**6).run(tmp_path / "run", progress=False)
-    with pytest.raises(ConfigError, match="threads = 0"):
-        small.run(tmp_path / "run", threads=0, progress=False)
+    for threads in (0, -1):
+        with pytest.raises(ConfigError, match=f"threads = {threads}"):
+            small.run(tmp_path / "run", threads=threads, progress=False)
+        with pytest.raises(ConfigError, match=f"threads = {threads}"):
+            small.simulation(threads=threads)
     with pytest.raises(RunFolderError, match="not a folder that can be written to"):
         small.run("/proc/version/run", progress=False)
     assert not list(tmp_path.iterdir())
@@ -187,6 +192,10 @@ def test_steps_are_evenly_spaced(small):
         assert state["velocity"].shape[1] == 2
     assert not times
     assert simulation.until == small.default_until
+    assert repr(simulation).startswith("Simulation(t* = 0.25")
+    for every in (0, -1, np.nan):
+        with pytest.raises(ConfigError, match=f"every = {every}"):
+            next(simulation.steps(every=every))
 
 
 def test_going_back_gives_the_same_steps(small):
@@ -277,3 +286,14 @@ def test_as_much_leaves_as_enters(small):
     assert entered == pytest.approx(3 * small.height, rel=0.05)
     assert left == pytest.approx(entered, rel=0.05)
     assert history["fluid"] == pytest.approx(np.full(simulation.step, simulation.counts["fluid"]), rel=0.03)
+
+
+def test_only_a_second_wish_to_stop_interrupts_at_once(monkeypatch):
+    with _interruptible() as interrupted:
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)  # the echo from a wrapper that passes the terminal's Ctrl-C on
+        assert interrupted.is_set()
+        now = time.monotonic()
+        monkeypatch.setattr(time, "monotonic", lambda: now + 2)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)

@@ -1,6 +1,7 @@
 """The driver of a run: stepping, output schedule, checkpoints, and how a run may end."""
 
 import contextlib
+import math
 import os
 import signal
 import threading
@@ -62,7 +63,7 @@ def resume(path: str | Path, until: float | None = None, threads: int | None = N
     state = folder.read_checkpoint()
     if state["time"] >= config.until:
         raise RunFolderError(
-            f"{path}: has reached its end, t* = {state['time']:.4g}; go on with --until {2 * config.until:g}"
+            f"{path}: has reached its end, t* = {state['time']:.4g}; go on with --until {2 * state['time']:.3g}"
         )
     simulation = Simulation(config.case.problem(state), config.run.threads)
     folder.truncate(simulation.step, simulation.time)
@@ -193,12 +194,17 @@ class _Driver:
 
 @contextlib.contextmanager
 def _interruptible() -> Iterator[threading.Event]:
-    """Give an event that Ctrl-C and SIGTERM set, so that no write is cut short; a second one interrupts at once."""
-    event = threading.Event()
+    """Give an event that Ctrl-C and SIGTERM set, so that no write is cut short.
+
+    Another one a second later or more interrupts at once; before, it is an echo from the terminal or a wrapper.
+    """
+    event, first = threading.Event(), math.inf
 
     def handler(_number: int, _frame: FrameType | None) -> None:
-        if event.is_set():
+        nonlocal first
+        if clock.monotonic() > first + 1.0:
             raise KeyboardInterrupt
+        first = min(first, clock.monotonic())
         event.set()
 
     main = threading.current_thread() is threading.main_thread()

@@ -69,8 +69,15 @@ class Simulation:
         self._start(problem.state, threads)
 
     def _start(self, state: dict[str, Any], threads: int | None) -> None:
+        if threads is not None and threads < 1:
+            raise ConfigError(f"threads = {threads}: must be 1 or more")
         with _translated():
             self._engine = _alsph.Simulation(json.dumps(self.problem.settings), state, threads)
+
+    def __repr__(self) -> str:
+        """Name the time, the step and the particles."""
+        particles = ", ".join(f"{count} {kind}" for kind, count in self.counts.items() if count)
+        return f"Simulation(t* = {self.time:.4g}, step {self.step}: {particles})"
 
     @property
     def time(self) -> float:
@@ -131,6 +138,8 @@ class Simulation:
 
     def steps(self, every: float, until: float | None = None) -> Iterator[dict[str, NDArray[Any]]]:
         """Step to the next multiple of `every` [D/U], yield a :meth:`snapshot`, and so on until `until`."""
+        if not 0 < every < math.inf:
+            raise ConfigError(f"every = {every}: must be a positive number [D/U]")
         until = self.until if until is None else until
         while self.time < until:
             self.run_until(min(next_multiple(self.time, every), until))
@@ -143,7 +152,8 @@ class Simulation:
         -------
         dict
             ``position``, ``velocity``, ``normal`` (n, d), ``pressure``, ``volume``, ``velocity_divergence``, ``kind``,
-            ``body``, ``depth``, ``id`` (n,) and ``vorticity``, (n,) in 2-D and (n, 3) in 3-D.
+            ``body``, ``depth``, ``id`` (n,) and ``vorticity``, (n,) in 2-D and (n, 3) in 3-D; and the numbers ``time``,
+            ``step``, ``mass_in``, ``mass_out`` and ``next_id``.
         """
         return self._engine.snapshot()
 
