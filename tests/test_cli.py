@@ -30,6 +30,13 @@ def test_end_to_end(alsph, tmp_path, small_options):
         assert str(run / "figures" / f"{name}.png") in stdout
         assert (run / "figures" / f"{name}.png").stat().st_size > 1000
 
+    assert alsph("plot", run, "-o", tmp_path / "elsewhere" / "figures")[0] == 0
+    assert (tmp_path / "elsewhere" / "figures" / "forces.png").exists()
+    code, stdout, stderr = alsph("plot", run, "--field", "vortcity")
+    assert (code, stdout, "did you mean 'vorticity'?" in stderr) == (2, "", True)
+    code, _, stderr = alsph("plot", run, "-o", run / "case.toml")
+    assert (code, stderr.startswith("error: "), "Traceback" in stderr) == (2, True, False)
+
     code, _, stderr = alsph("run", "cylinder", *small_options, "-o", run)
     assert (code, "exists already" in stderr) == (2, True)
     assert alsph("resume", run, "--until", 0.25)[0] == 0
@@ -64,6 +71,13 @@ def test_help_teaches_every_parameter(alsph, case, command):
         assert f"--{name.replace('_', '-')} " in words
         assert field.description in words
     assert "--until" in words
+
+
+def test_plot_in_3d_draws_what_it_can(alsph, tmp_path):
+    run = tmp_path / "run"
+    assert alsph("run", "taylor_green", "--dimensions=3", "--resolution=8", "--until=0.01", "-o", run)[0] == 0
+    assert alsph("plot", run)[:2] == (0, f"{run / 'figures' / 'history.png'}\n")
+    assert "2-D only" in alsph("plot", run, "--field", "pressure")[2]
 
 
 def test_describe(alsph, small_options):
@@ -115,6 +129,7 @@ def test_divergence_is_exit_code_1(alsph, tmp_path, small_options):
     assert code == 1
     assert "last good state" in stderr
     assert "Traceback" not in stderr
+    assert "last good state" in alsph("info", tmp_path / "run")[1]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -129,6 +144,7 @@ def test_interrupted_run_can_be_resumed(alsph, tmp_path, small_options, number):
     process.send_signal(number)
     _, stderr = process.communicate(timeout=30)
     assert process.returncode == 130
+    assert "Traceback" not in stderr
     assert f"go on with: alsph resume {run}" in stderr
     interrupted = open_run(run)
     assert interrupted.status == "interrupted"

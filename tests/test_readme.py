@@ -1,5 +1,8 @@
 import re
+import tomllib
 from pathlib import Path
+
+from alsph import config
 
 README = Path(__file__).parent.parent / "README.md"
 SMALL_SCALE = {
@@ -20,6 +23,11 @@ def test_the_python_example_runs(tmp_path, monkeypatch, capsys):
     for picture in ("forces.png", "vorticity.png", "pressure_coefficient.png"):
         assert (tmp_path / picture).stat().st_size > 5000
     assert capsys.readouterr().out
+
+
+def test_the_configuration_file_is_valid():
+    (example,) = re.findall(r"```toml\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    assert config.from_tables(tomllib.loads(example)).until == 60
 
 
 def test_links_lead_somewhere():

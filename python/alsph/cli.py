@@ -7,17 +7,15 @@ import functools
 import inspect
 import types
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import typer
-from rich.console import Console
-from rich.table import Table
 from typer.core import TyperGroup
 
-from alsph import _alsph, cases, config
+from alsph import _alsph, cases, config, plotting
 from alsph.config import Config, RunSettings
 from alsph.describe import describe
 from alsph.errors import AlsphError
@@ -33,9 +31,9 @@ def _exit_codes() -> Iterator[None]:
     """Turn errors into one line on stderr and an exit code: 2 user's mistake, 1 solver, 130 Ctrl-C."""
     try:
         yield
-    except AlsphError as error:
+    except (AlsphError, OSError) as error:
         typer.secho(f"error: {error}", fg="red", err=True)
-        raise typer.Exit(error.exit_code) from None
+        raise typer.Exit(error.exit_code if isinstance(error, AlsphError) else 2) from None
     except KeyboardInterrupt as stop:
         typer.echo(str(stop) or "interrupted", err=True)
         raise typer.Exit(INTERRUPTED) from None
@@ -53,18 +51,30 @@ class CaseGroup(TyperGroup):
             return super().get_command(ctx, cases.find(cmd_name).name)
 
 
+class Commands(TyperGroup):
+    """The commands in the order in which they are used."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of the commands."""
+        return ["cases", "describe", "run", "resume", "info", "plot"]
+
+
 app = typer.Typer(
-    no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, help="Augmented Lagrangian SPH."
+    cls=Commands,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="Incompressible flow with particles: augmented Lagrangian SPH.",
+    epilog="Start with: alsph run cylinder --resolution 10 --until 20",
 )
 group_settings: dict[str, Any] = {
     "cls": CaseGroup,
     "no_args_is_help": True,
     "subcommand_metavar": "CASE|FILE.toml [OPTIONS]",
+    "epilog": "The options are the parameters of the case: see CASE --help. They override those of a file.",
 }
-run_app = typer.Typer(help="Run a case, or a configuration file, into a new run folder.", **group_settings)
-describe_app = typer.Typer(
-    help="Tell what a run will take: particles, memory, time step limits, time.", **group_settings
-)
+run_app = typer.Typer(help="Run a case, or a file, into a run folder.", **group_settings)
+describe_app = typer.Typer(help="Tell beforehand what a run will take.", **group_settings)
 app.add_typer(run_app, name="run")
 app.add_typer(describe_app, name="describe")
 
@@ -104,8 +114,8 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
     parameters = [
         first,
         *keywords,
-        *_options(model, model.parameter_names()),
-        *_options(RunSettings, RunSettings.model_fields),
+        *_options(model, model.parameter_names(), {}),
+        *_options(RunSettings, RunSettings.model_fields, {"until": f"{model.default_until:g}", "threads": "all cores"}),
     ]
     functools.update_wrapper(command, action)
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
@@ -113,14 +123,14 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
     return command
 
 
-def _options(model: type[Parameters], names: Iterable[str]) -> Iterator[inspect.Parameter]:
-    """Make an option of each named field of a model."""
+def _options(model: type[Parameters], names: Iterable[str], defaults: Mapping[str, str]) -> Iterator[inspect.Parameter]:
+    """Make an option of each named field of a model; `defaults` says what stands for None."""
     for name in names:
         kind, choices = _option_type(model.model_fields[name].annotation)
         flag = f"--{name.replace('_', '-')}"
         option = typer.Option(
             f"{flag}/--no-{flag[2:]}" if kind is bool else flag,
-            help=f"{model.describe(name)}  [default: {describe_default(model, name)}]",
+            help=f"{model.describe(name)}  [default: {defaults.get(name) or describe_default(model, name)}]",
             show_default=False,
             metavar="|".join(map(str, choices)) or None,
             parser=_choice_of(choices) if choices else None,
@@ -153,9 +163,8 @@ def _choice_of(choices: tuple[Any, ...]) -> Callable[[str], Any]:
 
 for _model in cases.CASES.values():
     for _group, _action in ((run_app, _run), (describe_app, _describe)):
-        _group.command(_model.name, help=(_model.__doc__ or "").split("\n\nParameters\n")[0])(
-            _case_command(_model, _action)
-        )
+        _help = (_model.__doc__ or "").split("\n\nParameters\n")[0]
+        _group.command(_model.name, help=_help, short_help=_model.title)(_case_command(_model, _action))
 
 
 @app.command("resume")
@@ -173,20 +182,29 @@ def _resume(
 @_exit_codes()
 def _plot(
     path: RunPath,
-    field: Annotated[list[str], typer.Option(help="field to draw, may be repeated")] = ["vorticity", "pressure"],  # noqa: B006
+    field: Annotated[
+        list[str] | None,
+        typer.Option(help="field to draw, may be repeated", show_default="vorticity and pressure; none in 3-D"),
+    ] = None,
     time: Annotated[float | None, typer.Option(help="time of the fields [D/U]", show_default="the last")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="folder for the figures", show_default="RUN/figures")
+    ] = None,
 ) -> None:
-    """Draw the figures of a run into RUN/figures: forces, pressure coefficient, history, fields."""
-    import matplotlib
+    """Draw the figures of a run.
 
-    matplotlib.use("Agg")
+    These are the forces, the pressure coefficient, the history of the run, and fields.
+    """
     run = Run(path)
-    figures = path / "figures"
+    field = field or ([] if run.case.get("dimensions") == 3 else ["vorticity", "pressure"])
+    for name in field:
+        plotting.field_style(name)
+    figures = output or path / "figures"
     drawings: dict[str, Callable[[Path], object]] = {"history": run.plot_history}
     if run.bodies:
         drawings |= {"forces": run.plot_forces, "pressure_coefficient": run.plot_pressure_coefficient}
     drawings |= {name: functools.partial(run.plot_field, name, time) for name in field}
-    figures.mkdir(exist_ok=True)
+    figures.mkdir(parents=True, exist_ok=True)
     for name, draw in drawings.items():
         draw(figures / f"{name}.png")
         typer.echo(figures / f"{name}.png")
@@ -217,10 +235,9 @@ def _report(run: Run) -> None:
 
 
 def _print_table(rows: list[tuple[str, str]]) -> None:
-    table = Table.grid(padding=(0, 2))
-    for row in rows:
-        table.add_row(*row)
-    Console(highlight=False, soft_wrap=True).print(table, markup=False)
+    width = max(len(name) for name, _ in rows)
+    for name, value in rows:
+        typer.echo(f"{name:{width}}  {value}")
 
 
 def main() -> None:

@@ -40,13 +40,13 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
         ("Reynolds number", f"{case.reynolds:g}"),
         ("resolution", f"D/Δx = {case.resolution}, Δx = {case.particle_spacing:.6g} D"),
         ("particles", f"{kinds.sum():,}: {counts}"),
-        ("memory", f"about {case.memory() / 2**20:,.0f} MiB"),
+        ("memory", f"about {np.ceil(case.memory() / 2**20):,.0f} MiB, beside Python's own"),
         ("time step", f"ΔtU/Δx = {case.time_step:.4g}" + (" or less (adaptive)" if case.adaptive_time_step else "")),
     ]
     for name, limit in limits.items():
-        binds = " (binds)" if name == binding else ""
-        text = f"ΔtU/Δx < {limit:.4g} at u_max = {case.velocity_max:g} U{binds}" if np.isfinite(limit) else "none"
-        lines.append((f"{name.replace('_', ' ')} limit", text))
+        if np.isfinite(limit):
+            text = f"ΔtU/Δx < {limit:.4g} at u_max = {case.velocity_max:g} U{' (binds)' if name == binding else ''}"
+            lines.append((f"{name.replace('_', ' ')} limit", text))
     lines.append(("steps", f"about {steps:,.0f} to t* = {config.until:g}"))
     if probe:
         seconds = _seconds_per_step(Simulation(problem, config.run.threads))

@@ -1,6 +1,7 @@
 """The base of all validated parameter sets: strict types, unknown names refused, errors in one line."""
 
 import difflib
+import inspect
 from collections.abc import Iterable
 from typing import Any
 
@@ -33,7 +34,7 @@ class Parameters(BaseModel):
         lines = [
             f"{name} : default {describe_default(cls, name)}\n    {cls.describe(name)}" for name in cls.model_fields
         ]
-        cls.__doc__ = f"{(cls.__doc__ or '').strip()}\n\nParameters\n----------\n" + "\n".join(lines)
+        cls.__doc__ = f"{inspect.cleandoc(cls.__doc__ or '')}\n\nParameters\n----------\n" + "\n".join(lines)
 
     @classmethod
     def describe(cls, name: str) -> str:

@@ -27,7 +27,7 @@ class Reporter:
 
     def __init__(self, until: float, time: float, *, enabled: bool = True) -> None:
         self._until, self._first_time, self._enabled = until, time, enabled
-        console = Console(highlight=False, soft_wrap=True)
+        console = Console(highlight=False)
         self._console = console
         self._live: Live | None = None
         if enabled and (console.is_terminal or console.is_jupyter):
@@ -68,7 +68,7 @@ class Reporter:
             done = (time - self._first_time) / (self._until - self._first_time)
             left = duration(seconds * (1 / done - 1)) if done > 0 else "?"
             line = f"{100 * time / self._until:5.1f} %  {rate}  ETA {left}  {physics_line(rows)}"
-            self._console.print(line, markup=False)
+            self._console.print(line, markup=False, soft_wrap=True)
 
 
 def physics_line(rows: dict[str, Any]) -> str:
