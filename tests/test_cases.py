@@ -134,3 +134,13 @@ def test_taylor_green_perturbation_is_seeded():
     assert (first == same).all()
     assert (first != other).any()
     assert np.abs(first - TaylorGreen().particles()["position"]).max() <= 0.2 / 50 + 1e-12
+
+
+def test_parameters_change_only_in_a_new_set():
+    case = Cylinder(reynolds=200, length=12.0)
+    other = case.replace(reynolds=100)
+    assert (case.reynolds, other.reynolds, other.length) == (200, 100, 12)
+    with pytest.raises(ConfigError, match="reynold: unknown parameter; did you mean 'reynolds'"):
+        case.replace(reynold=100)
+    with pytest.raises(ConfigError, match=r"cannot be changed; make another set with .replace\(reynolds=100\)"):
+        case.reynolds = 100

@@ -17,9 +17,10 @@ except ImportError as error:
 
 from alsph import cases, errors
 from alsph.results import Run
+from alsph.run import resume
 from alsph.simulation import Simulation
 
 open_run = Run
 """Open a run folder: ``alsph.open_run("runs/re200")``."""
 
-__all__ = ["Run", "Simulation", "__version__", "cases", "errors", "open_run"]
+__all__ = ["Run", "Simulation", "__version__", "cases", "errors", "open_run", "resume"]

@@ -3,7 +3,7 @@
 import difflib
 import inspect
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NoReturn, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -12,7 +12,7 @@ from alsph.errors import ConfigError
 
 
 class Parameters(BaseModel):
-    """An immutable set of named, validated parameters.
+    """An immutable set of named, validated parameters; :meth:`replace` makes another one.
 
     Raises
     ------
@@ -27,6 +27,14 @@ class Parameters(BaseModel):
             super().__init__(**{name: _plain(value) for name, value in values.items()})
         except ValidationError as error:
             raise ConfigError(_one_line(type(self), error)) from None
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a set with some parameters changed: ``case.replace(reynolds=100)``."""
+        return type(self)(**self.model_dump() | changes)
+
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        """Refuse: parameters stay as they were validated."""
+        raise ConfigError(f"{name}: parameters cannot be changed; make another set with .replace({name}={value!r})")
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:

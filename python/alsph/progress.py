@@ -76,8 +76,8 @@ def physics_line(rows: dict[str, Any]) -> str:
     last = {name: values[-1] for name, values in rows.items()}
     parts = [
         f"t* {last['time']:.3f}",
-        f"{last['iterations']:d} iterations{'' if last['converged'] else ' (cap)'}",
-        f"max|∇·u| {last['divergence_max']:.2e}",
+        f"{last['iterations']:d} iter{'' if last['converged'] else ' (cap)'}",
+        f"max|∇·u| {last['divergence_max']:.1e}",
     ]
     if "drag_coefficient" in last:
         parts += [f"C_D {last['drag_coefficient']:.3f}", f"C_L {last['lift_coefficient']:+.3f}"]

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from alsph.config import Config, RunSettings
+from alsph.config import Config
 from alsph.errors import AlsphError, RunFolderError, SolverError
 from alsph.io import RunFolder, size_of
 from alsph.progress import Reporter, duration
@@ -59,7 +59,7 @@ def resume(path: str | Path, until: float | None = None, threads: int | None = N
     config, info = folder.config(), folder.info()
     folder.check_idle()
     changes = {name: value for name, value in (("until", until), ("threads", threads)) if value is not None}
-    config = Config(config.case, RunSettings(**config.run.model_dump() | changes))
+    config = Config(config.case, config.run.replace(**changes))
     state = folder.read_checkpoint()
     if state["time"] >= config.until:
         raise RunFolderError(
