@@ -64,14 +64,14 @@ fn stages(criterion: &mut Criterion) {
         let settings = settings(side, "initial");
         let mut particles = particles(side);
         let mut frame = Frame::default();
-        frame.search(&settings, &mut particles, 0.0);
+        frame.search(&settings, &mut particles, 0.0, true);
         let count = particles.real;
         let pairs = frame.stencil.neighbours.pair_count();
         println!("{count} particles, {:.1} neighbours each", pairs as f64 / count as f64);
         let mut group = criterion.benchmark_group("stages");
         group.throughput(Throughput::Elements(pairs as u64)).sample_size(20);
         group.bench_function(BenchmarkId::new("search and stencil", count), |b| {
-            b.iter(|| frame.search(&settings, &mut particles, 0.0));
+            b.iter(|| frame.search(&settings, &mut particles, 0.0, true));
         });
         group.bench_function(BenchmarkId::new("stencil", count), |b| {
             b.iter(|| frame.update(&settings, &particles));

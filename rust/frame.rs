@@ -17,14 +17,16 @@ pub struct Frame<const D: usize> {
 }
 
 impl<const D: usize> Frame<D> {
-    /// Put the particles into cell order, create their images, search neighbours and evaluate the stencil. The list stays
-    /// complete until two particles have approached each other by `skin`.
-    pub fn search(&mut self, settings: &Settings, particles: &mut Particles<D>, skin: f64) {
+    /// Create the images of the particles, search neighbours and evaluate the stencil. The list stays complete until two
+    /// particles have approached each other by `skin`. With `reorder` the particles are first put into cell order.
+    pub fn search(&mut self, settings: &Settings, particles: &mut Particles<D>, skin: f64, reorder: bool) {
         let radius = settings.support_radius() + skin;
         self.skin = skin;
         particles.drop_images();
-        self.grid.build(&particles.position, radius);
-        particles.reorder(self.grid.order());
+        if reorder {
+            self.grid.build(&particles.position, radius, settings.bounds());
+            particles.reorder(self.grid.order());
+        }
         // Twice the skin, so that a list renewed within the step finds its images too.
         self.images.create(particles, &settings.domain, radius + skin);
         self.list_neighbours(settings, particles);
@@ -41,10 +43,12 @@ impl<const D: usize> Frame<D> {
 
     fn list_neighbours(&mut self, settings: &Settings, particles: &Particles<D>) {
         let radius = settings.support_radius() + self.skin;
-        self.grid.build(&particles.position, radius);
+        self.grid.build(&particles.position, radius, settings.bounds());
         self.stencil.neighbours.search(particles, &self.grid, radius);
         self.searched.clear();
-        self.searched.extend_from_slice(&particles.position[..particles.real]);
+        if self.skin > 0.0 {
+            self.searched.extend_from_slice(&particles.position[..particles.real]);
+        }
     }
 
     fn is_stale(&self, particles: &Particles<D>) -> bool {

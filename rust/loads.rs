@@ -54,19 +54,24 @@ pub fn loads<const D: usize>(
 ) -> Vec<Load<D>> {
     let centers: Vec<_> = settings.bodies.iter().map(|body| Vector::<D>::from_column_slice(&body.center)).collect();
     let chunk = |range: std::ops::Range<usize>| {
-        let mut loads = vec![Load::default(); centers.len()];
+        let mut loads = Vec::new();
         for s in range.filter(|&i| particles.kind[i] == ParticleKind::Solid) {
+            loads.resize(centers.len(), Load::default());
             let (pressure, viscous) = force_on(settings, particles, frame, walls, s);
             let body = particles.body[s] as usize;
             loads[body].add(&(particles.position[s] - centers[body]), pressure, viscous);
         }
         loads
     };
-    parallel::reduce(particles.real, chunk, |mut sum, part| {
+    // Most chunks hold no solid and give an empty vector.
+    let mut sum = parallel::reduce(particles.real, chunk, |mut sum: Vec<Load<D>>, part| {
+        sum.resize(sum.len().max(part.len()), Load::default());
         sum.iter_mut().zip(&part).for_each(|(sum, part)| sum.merge(part));
         sum
     })
-    .unwrap_or_default()
+    .unwrap_or_default();
+    sum.resize(centers.len(), Load::default());
+    sum
 }
 
 /// Pressure and viscous force on solid particle `s`.

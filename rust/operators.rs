@@ -169,15 +169,18 @@ impl<const D: usize> Neighbourhood<'_, D> {
         (self.correction.inverse * sums.gradient, self.correction.laplacian * sums.scalar)
     }
 
-    /// ∇²u + 2∇(∇·u), which (16) gives as printed: the vector form with the correction tensor.
+    /// ∇²u + 2∇(∇·u), which (16) gives as printed: the vector form with the correction tensor. Solid neighbours show the
+    /// velocity that `solid` gives.
     #[inline(always)]
-    pub fn vector_laplacian(&self, field: &[Vector<D>]) -> Vector<D> {
+    pub fn vector_laplacian(&self, field: &[Vector<D>], solid: impl Fn(usize) -> Vector<D>) -> Vector<D> {
         let mut sum = Vector::zeros();
-        for pair in self.row.all() {
+        let mut add = |pair: &Pair, u_j: Vector<D>| {
             let r_ij = self.position[self.i] - self.position[pair.j()];
-            let radial = (field[self.i] - field[pair.j()]).dot(&r_ij) / r_ij.norm_squared().max(f64::MIN_POSITIVE);
+            let radial = (field[self.i] - u_j).dot(&r_ij) / r_ij.norm_squared().max(f64::MIN_POSITIVE);
             sum += r_ij * (radial * pair.slope());
-        }
+        };
+        self.row.flowing().iter().for_each(|pair| add(pair, field[pair.j()]));
+        self.row.solid().iter().for_each(|pair| add(pair, solid(pair.j())));
         self.correction.inverse * sum * (2.0 * (D as f64 + 2.0))
     }
 

@@ -2,6 +2,7 @@
 
 use crate::error::{Result, setting};
 use crate::kernel::{KernelKind, Smoothing};
+use crate::particles::Vector;
 use crate::with_kernel;
 use serde::{Deserialize, Serialize};
 
@@ -87,7 +88,7 @@ pub struct Body {
     pub velocity: Vec<f64>,
     /// Whether the particles move with that velocity (a cavity's lid slides in place: false).
     pub moves: bool,
-    /// Point that the torque is taken about.
+    /// Point that the torque is taken about. It stays where it is when the body moves.
     pub center: Vec<f64>,
 }
 
@@ -165,6 +166,13 @@ impl Settings {
     /// Length of the inlet and outlet buffers: 6h, in whole spacings.
     pub fn buffer_length(&self) -> f64 {
         (6.0 * self.smoothing_ratio - 1e-9).ceil() * self.particle_spacing
+    }
+
+    /// A box beyond which nothing is expected: the domain, its buffers and solid walls.
+    pub fn bounds<const D: usize>(&self) -> (Vector<D>, Vector<D>) {
+        let margin = self.buffer_length() + 4.0 * self.support_radius();
+        let corner = |corner: &[f64], outward| Vector::from_fn(|axis, _| corner[axis] + outward * margin);
+        (corner(&self.domain.lower, -1.0), corner(&self.domain.upper, 1.0))
     }
 
     /// λ_max Δx²: the largest eigenvalue of the negative compact Laplacian on a square lattice, sought over the wave
@@ -245,7 +253,10 @@ impl Settings {
             return Err(setting("search_every_iteration", "needs derivative_frame = \"updated\""));
         }
         self.validate_vector("body_force", &self.body_force)?;
-        for body in &self.bodies {
+        for (k, body) in self.bodies.iter().enumerate() {
+            if self.bodies[..k].iter().any(|other| other.name == body.name) {
+                return Err(setting("bodies", format!("two are named \"{}\"; names must differ", body.name)));
+            }
             self.validate_vector(&format!("bodies.{}.velocity", body.name), &body.velocity)?;
             self.validate_vector(&format!("bodies.{}.center", body.name), &body.center)?;
         }

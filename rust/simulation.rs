@@ -5,11 +5,12 @@ use crate::error::{Error, Result, setting};
 use crate::frame::Frame;
 use crate::interpolation::interpolate;
 use crate::loads::loads;
+use crate::neighbours::Grid;
 use crate::parallel;
 use crate::particles::{Matrix, ParticleKind, Particles, Vector};
 use crate::report::{Clock, Report};
 use crate::scheme::{Alsph, Step};
-use crate::settings::{DerivativeFrame, Settings};
+use crate::settings::{Boundary, DerivativeFrame, Settings};
 use crate::shifting::shift;
 use rayon::ThreadPool;
 use std::ops::Range;
@@ -18,6 +19,9 @@ use std::time::{Duration, Instant};
 
 /// The adaptive time step may not fall below this fraction of the user's: by then the velocity has blown up.
 const SMALLEST_TIME_STEP: f64 = 1e-4;
+
+/// Particles are put into cell order once in so many steps. The order is part of the state, so a restart keeps it.
+const STEPS_BETWEEN_SORTS: u64 = 16;
 
 pub struct Simulation<const D: usize> {
     settings: Settings,
@@ -40,6 +44,9 @@ impl<const D: usize> Simulation<D> {
             return Err(setting("dimensions", format!("{} does not fit {D}-dimensional arrays", settings.dimensions)));
         }
         check_particles(&settings, &mut particles)?;
+        if !(clock.time.is_finite() && clock.mass_in.is_finite() && clock.mass_out.is_finite()) {
+            return Err(setting("state", format!("time and masses must be finite, not {clock:?}")));
+        }
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads.unwrap_or(0))
             .build()
@@ -83,7 +90,7 @@ impl<const D: usize> Simulation<D> {
 
     /// Take up to `steps` steps, fewer if `wall` time passes first. Returns the number taken.
     pub fn advance(&mut self, steps: u64, wall: Option<Duration>) -> Result<u64> {
-        let last = self.clock.step + steps;
+        let last = self.clock.step.saturating_add(steps);
         self.step_while(wall, |clock| clock.step < last)
     }
 
@@ -139,14 +146,15 @@ impl<const D: usize> Simulation<D> {
         if self.prepared {
             return;
         }
-        // Algorithm 1 moves particles while the list is in use; 1.2 leaves room for acceleration within the step.
+        // Algorithm 1 moves particles while the list is in use: twice u_max Δt, and a fifth for acceleration within the step.
         let skin = match self.settings.derivative_frame {
             DerivativeFrame::Updated => {
                 2.4 * (self.velocity_max() * self.settings.time_step).min(self.settings.particle_spacing)
             }
             DerivativeFrame::Initial => 0.0,
         };
-        self.frame.search(&self.settings, &mut self.particles, skin);
+        let reorder = self.clock.step.is_multiple_of(STEPS_BETWEEN_SORTS);
+        self.frame.search(&self.settings, &mut self.particles, skin, reorder);
         self.prepared = true;
     }
 
@@ -251,14 +259,14 @@ impl<const D: usize> Simulation<D> {
         })
     }
 
-    /// Positions of the inlet buffer particles.
+    /// Positions of the inlet buffer particles, by id.
     pub fn inflow_position(&self) -> Vec<Vector<D>> {
-        self.inlet_particles().map(|i| self.particles.position[i]).collect()
+        self.inlet_particles().into_iter().map(|i| self.particles.position[i]).collect()
     }
 
     /// Prescribe the velocities of the inlet buffer particles, in the order of `inflow_position`.
     pub fn set_inflow(&mut self, velocity: &[Vector<D>]) -> Result<()> {
-        let inlet: Vec<_> = self.inlet_particles().collect();
+        let inlet = self.inlet_particles();
         if velocity.len() != inlet.len() {
             let problem = format!("{} rows for {} inlet particles", velocity.len(), inlet.len());
             return Err(Error::Array { name: "inflow velocity", problem });
@@ -274,8 +282,12 @@ impl<const D: usize> Simulation<D> {
         Ok(())
     }
 
-    fn inlet_particles(&self) -> impl Iterator<Item = usize> {
-        (0..self.particles.real).filter(|&i| self.particles.kind[i] == ParticleKind::Inlet)
+    /// By id, because the order of storage changes whenever the particles are sorted.
+    fn inlet_particles(&self) -> Vec<usize> {
+        let particles = &self.particles;
+        let mut inlet: Vec<_> = (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Inlet).collect();
+        inlet.sort_unstable_by_key(|&i| particles.id[i]);
+        inlet
     }
 }
 
@@ -289,19 +301,19 @@ pub struct Snapshot<const D: usize> {
 /// Refuse arrays that cannot be simulated; give solid particles the velocity of their body.
 fn check_particles<const D: usize>(settings: &Settings, particles: &mut Particles<D>) -> Result<()> {
     let array = |name, problem| Err(Error::Array { name, problem });
+    particles.real = particles.len();
     if !particles.kind.contains(&ParticleKind::Fluid) {
         return array("kind", "holds no fluid particle (0)".into());
     }
     for i in 0..particles.len() {
-        let finite = |v: &Vector<D>| v.iter().all(|x| x.is_finite());
-        if !finite(&particles.position[i]) {
-            return array("position", format!("particle {i} is at {:?}", particles.position[i].as_slice()));
+        let vectors =
+            [("position", particles.position[i]), ("velocity", particles.velocity[i]), ("normal", particles.normal[i])];
+        if let Some((name, value)) = vectors.iter().find(|(_, value)| !value.iter().all(|x| x.is_finite())) {
+            return array(name, format!("of particle {i} is {:?}; all must be finite", value.as_slice()));
         }
-        if !finite(&particles.velocity[i]) {
-            return array("velocity", format!("of particle {i} is {:?}", particles.velocity[i].as_slice()));
-        }
-        if !particles.pressure[i].is_finite() {
-            return array("pressure", format!("of particle {i} is {}", particles.pressure[i]));
+        let scalars = [("pressure", particles.pressure[i]), ("depth", particles.depth[i])];
+        if let Some((name, value)) = scalars.iter().find(|(_, value)| !value.is_finite()) {
+            return array(name, format!("of particle {i} is {value}; all must be finite"));
         }
         if particles.kind[i] == ParticleKind::Solid {
             let Some(body) = settings.bodies.get(particles.body[i] as usize) else {
@@ -311,8 +323,47 @@ fn check_particles<const D: usize>(settings: &Settings, particles: &mut Particle
                 );
             };
             particles.velocity[i] = Vector::from_column_slice(&body.velocity);
+        } else if let Some(axis) = (0..D).find(|&axis| is_beyond_closed_side(settings, &particles.position[i], axis)) {
+            let [lower, upper] = [settings.domain.lower[axis], settings.domain.upper[axis]];
+            let x = particles.position[i][axis];
+            return array("position", format!("particle {i} is at {x} in direction {axis}, outside {lower}..{upper}"));
         }
     }
-    particles.real = particles.len();
+    check_ids(&particles.id)?;
+    check_spacing(settings, particles)
+}
+
+/// Whether `position` lies beyond a slip wall or periodic side.
+fn is_beyond_closed_side<const D: usize>(settings: &Settings, position: &Vector<D>, axis: usize) -> bool {
+    let closed = |side| matches!(side, Boundary::Slip | Boundary::Periodic);
+    let [lower, upper] = settings.domain.boundaries[axis];
+    (closed(lower) && position[axis] < settings.domain.lower[axis])
+        || (closed(upper) && position[axis] > settings.domain.upper[axis])
+}
+
+fn check_ids(ids: &[u64]) -> Result<()> {
+    let mut sorted = ids.to_vec();
+    sorted.sort_unstable();
+    match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => Err(Error::Array { name: "id", problem: format!("{} stands twice", pair[0]) }),
+        None if sorted.last() == Some(&u64::MAX) => Err(Error::Array { name: "id", problem: "is too large".into() }),
+        None => Ok(()),
+    }
+}
+
+/// Refuse a spacing that does not fit the positions: the number of pairs grows with its power.
+fn check_spacing<const D: usize>(settings: &Settings, particles: &Particles<D>) -> Result<()> {
+    const MOST: f64 = 20.0;
+    let mut grid = Grid::default();
+    grid.build(&particles.position, settings.support_radius(), settings.bounds());
+    let mut candidates = 0;
+    particles.position.iter().for_each(|point| grid.for_each_run(point, |run| candidates += run.indices.len()));
+    let mean = candidates as f64 / particles.len() as f64;
+    let expected = (2.5 * settings.support_radius() / settings.particle_spacing).powi(D as i32);
+    if mean > MOST * expected + 64.0 {
+        let problem =
+            format!("does not fit the positions: {mean:.0} particles around each, where it makes {expected:.0} expected");
+        return Err(setting("particle_spacing", problem));
+    }
     Ok(())
 }

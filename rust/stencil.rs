@@ -39,13 +39,13 @@ impl<const D: usize> Stencil<D> {
         self.position.clone_from(&particles.position);
         self.volume.resize(particles.len(), 0.0);
         self.correction.resize(particles.real, Correction::of(&Matrix::identity()));
-        with_kernel!(settings.kernel, K => self.volumes(Smoothing::<K>::new(settings.smoothing_length(), D)));
+        with_kernel!(settings.kernel, K => self.volumes(Smoothing::<K>::new(settings.smoothing_length(), D), settings.particle_spacing.powi(D as i32)));
         mirror(&mut self.volume);
-        self.corrections();
+        self.corrections(settings.particle_spacing.powi(D as i32));
     }
 
-    /// V_i, and the slopes without V_j.
-    fn volumes<K: Kernel>(&mut self, kernel: Smoothing<K>) {
+    /// V_i, and the slopes with the nominal volume Δx^D in the place of V_j, lest f32 overflow in small units.
+    fn volumes<K: Kernel>(&mut self, kernel: Smoothing<K>, nominal: f64) {
         let position = &self.position;
         let real = self.correction.len();
         self.neighbours.for_each_mut(
@@ -62,7 +62,7 @@ impl<const D: usize> Stencil<D> {
                     kernel.evaluate(&squares, &mut values, &mut slopes);
                     sum += values.iter().sum::<f64>();
                     for (slope, pair) in slopes.iter().zip(block) {
-                        pair.slope = *slope as Slope;
+                        pair.slope = (nominal * slope) as Slope;
                     }
                 }
                 *volume = 1.0 / sum;
@@ -71,7 +71,7 @@ impl<const D: usize> Stencil<D> {
     }
 
     /// V_j into the slopes, and the correction tensor (17) from the slopes as stored.
-    fn corrections(&mut self) {
+    fn corrections(&mut self, nominal: f64) {
         let (volume, position) = (&self.volume, &self.position);
         let real = self.correction.len();
         self.neighbours.for_each_mut(
@@ -82,7 +82,7 @@ impl<const D: usize> Stencil<D> {
                 let mut alpha = Matrix::<D>::zeros();
                 for pair in pairs {
                     let r_ij = position[i] - position[pair.j()];
-                    pair.slope = (volume[pair.j()] * pair.slope()) as Slope;
+                    pair.slope = (volume[pair.j()] / nominal * pair.slope()) as Slope;
                     alpha -= r_ij * r_ij.transpose() * pair.slope();
                 }
                 *correction = Correction::of(&alpha);

@@ -157,8 +157,7 @@ fn a_restored_simulation_goes_on_to_the_last_bit() {
         let settings = with_algorithm(value, algorithm);
         let mut whole = Simulation::new(settings.clone(), particles, Clock::default(), Some(2)).expect("valid");
         whole.advance(20, None).expect("stable");
-        let mut saved = whole.particles().clone();
-        saved.drop_images();
+        let saved = without_images(whole.particles());
         let mut resumed = Simulation::new(settings, saved, whole.clock(), Some(1)).expect("valid");
         // Looking at the flow must not disturb it.
         whole.snapshot();
@@ -183,7 +182,8 @@ fn symmetric_flow_has_no_lift() {
     }
 }
 
-/// A box of fluid at rest under gravity between solid walls two support radii deep.
+/// A box of fluid under gravity between solid walls four layers deep, all sliding along at U = 1: u_max, and with it the
+/// penalty, does not vanish, and yet the pressure must become hydrostatic.
 fn tank(wall_pressure: &str) -> (Settings, Particles<2>) {
     let (side, layers) = (16i64, 4i64);
     let spacing = 1.0 / side as f64;
@@ -191,6 +191,7 @@ fn tank(wall_pressure: &str) -> (Settings, Particles<2>) {
     value["wall_pressure"] = wall_pressure.into();
     value["body_force"] = json!([0.0, -1.0]);
     value["domain"]["boundaries"] = json!([["periodic", "periodic"], ["none", "none"]]);
+    value["bodies"][0]["velocity"] = json!([1.0, 0.0]);
     let mut particles = common::particles(Vec::new());
     for column in 0..side {
         for row in -layers..side + layers {
@@ -198,42 +199,40 @@ fn tank(wall_pressure: &str) -> (Settings, Particles<2>) {
             let depth = (-position[1]).max(position[1] - 1.0);
             particles.position.push(position);
             particles.kind.push(if depth > 0.0 { ParticleKind::Solid } else { ParticleKind::Fluid });
-            particles.normal.push(Vector::from([
-                0.0,
-                if depth <= 0.0 {
-                    0.0
-                } else if position[1] < 0.0 {
-                    1.0
-                } else {
-                    -1.0
-                },
-            ]));
+            let outward = if position[1] < 0.5 { 1.0 } else { -1.0 };
+            particles.normal.push(Vector::from([0.0, if depth > 0.0 { outward } else { 0.0 }]));
             particles.depth.push(depth.max(0.0));
-            // Start from hydrostatics: with u_max = 0 the penalty vanishes and nothing may move.
-            particles.pressure.push(0.5 - position[1]);
         }
     }
     let count = particles.position.len();
     particles.real = count;
-    particles.velocity = vec![Vector::zeros(); count];
+    particles.pressure = vec![0.0; count];
+    particles.velocity = vec![Vector::from([1.0, 0.0]); count];
     particles.body = vec![0; count];
     particles.id = (0..count as u64).collect();
     (common::parse(&value), particles)
 }
 
 #[test]
-fn hydrostatic_pressure_holds_the_fluid_and_weighs_on_the_walls() {
+fn hydrostatic_pressure_builds_up_and_weighs_on_the_walls() {
     for rule in ["paper", "adami"] {
         let (settings, particles) = tank(rule);
         let mut simulation = Simulation::new(settings, particles, Clock::default(), Some(2)).expect("valid");
-        simulation.advance(50, None).expect("stable");
+        simulation.advance_until(4.0, None).expect("stable");
         let particles = simulation.particles();
-        let fastest = particles.velocity.iter().map(|u| u.norm()).fold(0.0, f64::max);
+        let fluid = || (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Fluid);
+        let fastest = fluid().map(|i| particles.velocity[i][1].abs()).fold(0.0, f64::max);
         assert!(fastest < 0.02, "{rule}: the fluid at rest moves at {fastest}");
+        let mean = |f: &dyn Fn(usize) -> f64| fluid().map(f).sum::<f64>() / fluid().count() as f64;
+        let middle = mean(&|i| particles.pressure[i]);
+        for i in fluid() {
+            let exact = middle + 0.5 - particles.position[i][1];
+            assert!((particles.pressure[i] - exact).abs() < 0.03, "{rule}: {} at {}", particles.pressure[i], exact);
+        }
         let load = simulation.take_history().pop().expect("steps were taken").loads[0];
         // The weight of the unit square of fluid, both walls together.
-        assert_relative_eq!(load.pressure_force[1], -1.0, max_relative = 0.03);
-        assert_relative_eq!(load.pressure_force[0], 0.0, epsilon = 1e-6);
+        assert_relative_eq!(load.pressure_force[1], -1.0, max_relative = 0.05);
+        assert_relative_eq!(load.pressure_force[0], 0.0, epsilon = 1e-3);
     }
 }
 
@@ -250,7 +249,7 @@ fn couette_flow_is_driven_by_its_sliding_wall() {
             {"name": "lid", "velocity": [1.0, 0.0], "moves": false, "center": [0.0, 1.0]},
         ]);
         for i in 0..particles.real {
-            particles.pressure[i] = 0.0;
+            particles.velocity[i] = Vector::zeros();
             particles.body[i] = u16::from(particles.kind[i] == ParticleKind::Solid && particles.position[i][1] > 1.0);
         }
         let mut simulation = Simulation::new(common::parse(&value), particles, Clock::default(), Some(2)).expect("valid");
@@ -298,10 +297,87 @@ fn a_step_beyond_the_stability_law_ends_in_an_error_and_the_last_good_state() {
     value["time_step"] = (0.3 / 24.0).into();
     let mut simulation =
         Simulation::new(common::parse(&value), taylor_green(24, 0.1), Clock::default(), Some(2)).expect("valid");
-    let error = simulation.advance(10_000, None).expect_err("three times the stable step");
+    let mut good = bits(simulation.particles());
+    let error = loop {
+        match simulation.advance(1, None) {
+            Ok(_) => good = bits(&without_images(simulation.particles())),
+            Err(error) => break error,
+        }
+    };
     assert!(error.to_string().contains("diverged at step"), "{error}");
-    let particles = simulation.particles();
-    assert!(particles.position.iter().chain(&particles.velocity).all(|v| v.iter().all(|x| x.is_finite())));
+    assert!(simulation.clock().step < 10_000);
+    // The same state, perhaps in another order.
+    let mut kept = bits(&without_images(simulation.particles()));
+    kept.sort_unstable();
+    good.sort_unstable();
+    assert_eq!(kept, good);
+}
+
+fn without_images(particles: &Particles<2>) -> Particles<2> {
+    let mut particles = particles.clone();
+    particles.drop_images();
+    particles
+}
+
+#[test]
+fn an_inlet_may_lie_on_any_side() {
+    let (side, down) = (16i64, Vector::from([0.0, -1.0]));
+    let spacing = 1.0 / side as f64;
+    let mut value = common::settings_value::<2>(spacing, "slip");
+    value["domain"]["boundaries"] = json!([["slip", "slip"], ["outlet", "inlet"]]);
+    let rows = (0..side).flat_map(|column| (-8..side + 8).map(move |row| [column, row]));
+    let mut particles = common::particles(rows.map(|cell| Vector::from(cell.map(|c| (c as f64 + 0.5) * spacing))).collect());
+    for i in 0..particles.real {
+        particles.velocity[i] = down;
+        particles.kind[i] = match particles.position[i][1] {
+            y if y < 0.0 => ParticleKind::Outlet,
+            y if y > 1.0 => ParticleKind::Inlet,
+            _ => ParticleKind::Fluid,
+        };
+    }
+    let counts = particles.counts();
+    let mut simulation = Simulation::new(common::parse(&value), particles, Clock::default(), Some(2)).expect("valid");
+    simulation.advance_until(1.2, None).expect("stable");
+    for i in 0..simulation.particles().real {
+        assert_relative_eq!(simulation.particles().velocity[i], down, epsilon = 1e-9);
+    }
+    assert_eq!(simulation.particles().counts(), counts);
+    assert_relative_eq!(simulation.clock().mass_in, simulation.clock().mass_out, epsilon = 1e-12);
+}
+
+#[test]
+fn each_particle_crosses_the_side_that_it_is_at() {
+    // Inlets left and right, outlets below and above.
+    use ParticleKind::{Fluid, Inlet, Outlet};
+    let mut value = common::settings_value::<2>(0.1, "none");
+    value["domain"]["boundaries"] = json!([["inlet", "inlet"], ["outlet", "outlet"]]);
+    let settings = common::parse(&value);
+    let buffer = settings.buffer_length();
+    let cases = [
+        ([-0.01, 0.5], Inlet, Some(Inlet)),
+        ([0.01, 0.5], Inlet, Some(Fluid)),
+        ([1.01, 0.5], Inlet, Some(Inlet)),
+        ([0.99, 0.5], Inlet, Some(Fluid)),
+        ([0.5, 0.5], Fluid, Some(Fluid)),
+        ([0.5, -0.01], Fluid, Some(Outlet)),
+        ([0.5, 1.01], Fluid, Some(Outlet)),
+        ([0.5, 0.01], Outlet, Some(Fluid)),
+        ([0.5, 1.2], Outlet, Some(Outlet)),
+        ([0.5, 1.01 + buffer], Outlet, None),
+        ([0.5, -0.01 - buffer], Outlet, None),
+    ];
+    let mut particles = common::particles(cases.iter().map(|case| Vector::from(case.0)).collect());
+    particles.kind = cases.iter().map(|case| case.1).collect();
+    let flow = alsph::boundary::end_step(&mut particles, &settings, &alsph::neighbours::Grid::default(), &mut 100);
+    for (id, (position, _, kind)) in cases.iter().enumerate() {
+        let found = particles.id.iter().position(|&other| other == id as u64).map(|i| particles.kind[i]);
+        assert_eq!(found, *kind, "at {position:?}");
+    }
+    let refilled: Vec<_> = (0..particles.real).filter(|&i| particles.id[i] >= 100).map(|i| particles.position[i]).collect();
+    assert_eq!(refilled, [Vector::from([0.01 - buffer, 0.5]), Vector::from([0.99 + buffer, 0.5])]);
+    // Two entered; two left and one came back.
+    assert_relative_eq!(flow.inflow, 2.0 * 0.01, epsilon = 1e-12);
+    assert_relative_eq!(flow.outflow, 0.01, epsilon = 1e-12);
 }
 
 #[test]

@@ -56,7 +56,7 @@ fn check<const D: usize>(points: Vec<Vector<D>>, boundary: &str, solid: u64) -> 
         }
     }
     let mut frame = Frame::default();
-    frame.search(&settings, &mut particles, 0.0);
+    frame.search(&settings, &mut particles, 0.0, true);
     let expected = brute_force_neighbours(&particles.position, particles.real, settings.support_radius());
     prop_assert_eq!(listed(&frame, &particles), expected);
     let counts: Vec<usize> = listed(&frame, &particles).iter().map(Vec::len).collect();
@@ -95,7 +95,7 @@ fn far_strays_cost_no_memory() {
     let settings = common::settings::<2>(0.1, "none");
     let mut particles = common::particles(points);
     let mut frame = Frame::default();
-    frame.search(&settings, &mut particles, 0.0);
+    frame.search(&settings, &mut particles, 0.0, true);
     let expected = brute_force_neighbours(&particles.position, particles.real, settings.support_radius());
     assert_eq!(listed(&frame, &particles), expected);
 }

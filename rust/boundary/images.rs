@@ -3,6 +3,7 @@
 //! An image has position `sign * x + offset` and velocity `sign * u` of its source, and its scalars. Corners are images of
 //! images, so one direction after the other is enough.
 
+use crate::parallel;
 use crate::particles::{Particles, Vector};
 use crate::settings::{Boundary, Domain};
 
@@ -59,11 +60,9 @@ impl<const D: usize> Images<D> {
     }
 
     /// Renew the entries of the images from those of the real particles in front of them.
-    fn renew<T: Copy>(&self, field: &mut [T], image: impl Fn(usize, T) -> T) {
+    fn renew<T: Copy + Send + Sync>(&self, field: &mut [T], image: impl Fn(usize, T) -> T + Sync + Send) {
         let (real, images) = field.split_at_mut(field.len() - self.source.len());
-        for (k, value) in images.iter_mut().enumerate() {
-            *value = image(k, real[self.source[k] as usize]);
-        }
+        parallel::for_each(images, |k, value| *value = image(k, real[self.source[k] as usize]));
     }
 
     pub fn positions(&self, field: &mut [Vector<D>]) {
@@ -75,7 +74,7 @@ impl<const D: usize> Images<D> {
     }
 
     /// Any field that an image shares with its source.
-    pub fn scalars<T: Copy>(&self, field: &mut [T]) {
+    pub fn scalars<T: Copy + Send + Sync>(&self, field: &mut [T]) {
         self.renew(field, |_, value| value);
     }
 }

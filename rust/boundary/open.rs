@@ -19,55 +19,113 @@ pub fn end_step<const D: usize>(
     grid: &Grid<D>,
     next_id: &mut u64,
 ) -> MassFlow {
-    let mut flow = MassFlow::default();
-    let mass = settings.density * settings.particle_spacing.powi(D as i32);
+    let sides = sides(settings);
+    let of = |kind| sides.iter().filter(|side| side.kind == kind).copied().collect::<Vec<_>>();
+    of(Boundary::Slip).iter().for_each(|side| side.reflect(particles));
+    of(Boundary::Periodic).iter().for_each(|side| side.wrap(particles, settings));
     let mut keep = vec![true; particles.real];
-    let mut entered = Vec::new();
-    for axis in 0..D {
-        let [lower_kind, upper_kind] = settings.domain.boundaries[axis];
-        for (side, inward) in [(lower_kind, 1.0), (upper_kind, -1.0)] {
-            let plane = if inward > 0.0 { settings.domain.lower[axis] } else { settings.domain.upper[axis] };
-            let crossing = Crossing { axis, plane, inward, settings };
-            match side {
-                Boundary::Inlet => entered.extend(crossing.inlet(particles).map(|i| (i, axis, inward))),
-                Boundary::Outlet => flow.outflow += mass * crossing.outlet(particles, &mut keep) as f64,
-                Boundary::Slip => crossing.reflect(particles),
-                Boundary::Periodic => crossing.wrap(particles),
-                Boundary::None => {}
+    let left = leave(particles, &of(Boundary::Outlet), settings.buffer_length(), &mut keep);
+    let entered = enter(particles, &of(Boundary::Inlet), settings, grid, next_id);
+    keep.resize(particles.real, true);
+    if keep.contains(&false) {
+        particles.retain(&keep);
+    }
+    let mass = settings.density * settings.particle_spacing.powi(D as i32);
+    MassFlow { inflow: mass * entered as f64, outflow: mass * left as f64 }
+}
+
+/// One side of the domain.
+#[derive(Clone, Copy)]
+struct Side {
+    kind: Boundary,
+    axis: usize,
+    plane: f64,
+    /// +1 where the domain lies above the plane, −1 where it lies below.
+    inward: f64,
+}
+
+fn sides(settings: &Settings) -> Vec<Side> {
+    let domain = &settings.domain;
+    (0..domain.boundaries.len())
+        .flat_map(|axis| {
+            let [lower, upper] = domain.boundaries[axis];
+            [
+                Side { kind: lower, axis, plane: domain.lower[axis], inward: 1.0 },
+                Side { kind: upper, axis, plane: domain.upper[axis], inward: -1.0 },
+            ]
+        })
+        .collect()
+}
+
+/// The side that `position` is farthest beyond, or nearest to, and its distance inside it.
+fn outermost<const D: usize>(sides: &[Side], position: &Vector<D>) -> Option<(f64, Side)> {
+    sides.iter().map(|&side| (side.inside(position), side)).min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// Fluid that crosses an outlet becomes buffer, buffer that came back becomes fluid, buffer at its end goes. Returns the net
+/// number that left.
+fn leave<const D: usize>(particles: &mut Particles<D>, outlets: &[Side], buffer_length: f64, keep: &mut [bool]) -> i64 {
+    let mut left = 0;
+    if outlets.is_empty() {
+        return left;
+    }
+    for i in 0..particles.real {
+        let inside = outermost(outlets, &particles.position[i]).map_or(0.0, |(inside, _)| inside);
+        match particles.kind[i] {
+            ParticleKind::Fluid if inside < 0.0 => {
+                particles.kind[i] = ParticleKind::Outlet;
+                particles.pressure[i] = 0.0;
+                left += 1;
             }
+            ParticleKind::Outlet if inside >= 0.0 => {
+                particles.kind[i] = ParticleKind::Fluid;
+                left -= 1;
+            }
+            ParticleKind::Outlet if inside < -buffer_length => keep[i] = false,
+            _ => {}
         }
     }
-    flow.inflow = mass * entered.len() as f64;
-    let refill: Vec<_> =
-        entered.iter().map(|&(i, axis, inward)| refill(particles, settings, grid, i, axis, inward)).collect();
-    for ((i, ..), (position, pressure)) in entered.into_iter().zip(refill) {
+    left
+}
+
+/// Inlet particles that have entered the domain become fluid, and new ones follow at the far end of the buffer. Returns
+/// how many entered.
+fn enter<const D: usize>(
+    particles: &mut Particles<D>,
+    inlets: &[Side],
+    settings: &Settings,
+    grid: &Grid<D>,
+    next_id: &mut u64,
+) -> usize {
+    let crossed = |i: &usize| match particles.kind[*i] {
+        ParticleKind::Inlet => outermost(inlets, &particles.position[*i]).filter(|(inside, _)| *inside >= 0.0),
+        _ => None,
+    };
+    let entered: Vec<(usize, Side)> = (0..particles.real).filter_map(|i| crossed(&i).map(|(_, side)| (i, side))).collect();
+    let refill: Vec<_> = entered.iter().map(|&(i, side)| refill(particles, settings, grid, i, side)).collect();
+    for (&(i, _), (position, pressure)) in entered.iter().zip(refill) {
         let new = particles.push_copy(i);
         particles.position[new] = position;
         particles.pressure[new] = pressure;
         particles.id[new] = *next_id;
         *next_id += 1;
         particles.kind[i] = ParticleKind::Fluid;
-        keep.push(true);
     }
     particles.real = particles.len();
-    if keep.contains(&false) {
-        particles.retain(&keep);
-    }
-    flow
+    entered.len()
 }
 
-/// The particle that replaces inlet particle `i` at the far end of the buffer, with the pressure that the flow has there:
-/// that of the nearest inlet particle.
+/// Position and pressure of the particle that replaces inlet particle `i` at the far end of the buffer. The pressure must come
+/// from the flow: it is that of the nearest inlet particle.
 fn refill<const D: usize>(
     particles: &Particles<D>,
     settings: &Settings,
     grid: &Grid<D>,
     i: usize,
-    axis: usize,
-    inward: f64,
+    side: Side,
 ) -> (Vector<D>, f64) {
     let mut position = particles.position[i];
-    position[axis] -= inward * settings.buffer_length();
+    position[side.axis] -= side.inward * settings.buffer_length();
     let mut nearest = (f64::INFINITY, particles.pressure[i]);
     grid.for_each_run(&position, |run| {
         for &j in run.indices {
@@ -83,47 +141,10 @@ fn refill<const D: usize>(
     (position, nearest.1)
 }
 
-/// One side of the domain.
-struct Crossing<'a> {
-    axis: usize,
-    plane: f64,
-    /// +1 where the domain lies above the plane, −1 where it lies below.
-    inward: f64,
-    settings: &'a Settings,
-}
-
-impl Crossing<'_> {
+impl Side {
     /// Distance inside the domain.
     fn inside<const D: usize>(&self, position: &Vector<D>) -> f64 {
         self.inward * (position[self.axis] - self.plane)
-    }
-
-    /// Inlet particles that have entered the domain.
-    fn inlet<const D: usize>(&self, particles: &Particles<D>) -> impl Iterator<Item = usize> {
-        (0..particles.real)
-            .filter(|&i| particles.kind[i] == ParticleKind::Inlet && self.inside(&particles.position[i]) >= 0.0)
-    }
-
-    /// Fluid becomes buffer, buffer that came back becomes fluid, buffer at its end goes. Returns the net number that left.
-    fn outlet<const D: usize>(&self, particles: &mut Particles<D>, keep: &mut [bool]) -> i64 {
-        let mut left = 0;
-        for i in 0..particles.real {
-            let inside = self.inside(&particles.position[i]);
-            match particles.kind[i] {
-                ParticleKind::Fluid if inside < 0.0 => {
-                    particles.kind[i] = ParticleKind::Outlet;
-                    particles.pressure[i] = 0.0;
-                    left += 1;
-                }
-                ParticleKind::Outlet if inside >= 0.0 => {
-                    particles.kind[i] = ParticleKind::Fluid;
-                    left -= 1;
-                }
-                ParticleKind::Outlet if inside < -self.settings.buffer_length() => keep[i] = false,
-                _ => {}
-            }
-        }
-        left
     }
 
     /// Put back what slipped through a slip wall by rounding or by a shift.
@@ -137,8 +158,8 @@ impl Crossing<'_> {
         }
     }
 
-    fn wrap<const D: usize>(&self, particles: &mut Particles<D>) {
-        let period = self.settings.domain.upper[self.axis] - self.settings.domain.lower[self.axis];
+    fn wrap<const D: usize>(&self, particles: &mut Particles<D>, settings: &Settings) {
+        let period = settings.domain.upper[self.axis] - settings.domain.lower[self.axis];
         for position in &mut particles.position[..particles.real] {
             // The upper plane is the lower one.
             if self.inside(position) < 0.0 || (self.inward < 0.0 && self.inside(position) == 0.0) {

@@ -2,36 +2,32 @@
 
 use crate::kernel::{Kernel, Smoothing};
 use crate::operators::Neighbourhood;
-use crate::particles::{Particles, Vector};
+use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{Settings, WallVelocity};
 use crate::with_kernel;
 
 /// Largest ratio of the distances of solid and fluid from the surface: β_max − 1 of Morris, Fox and Zhu (1997).
 const LARGEST_DISTANCE_RATIO: f64 = 0.5;
 
-/// The wall rules of a simulation.
+/// The wall rule of a simulation.
 #[derive(Debug)]
 pub struct Walls<const D: usize> {
     rule: WallVelocity,
-    body_velocity: Vec<Vector<D>>,
     /// Velocity that solid particles show to the viscous term, real particles and images (not used by the pairwise rule).
     pub viscous_velocity: Vec<Vector<D>>,
 }
 
 impl<const D: usize> Walls<D> {
     pub fn new(settings: &Settings) -> Self {
-        let body_velocity = settings.bodies.iter().map(|body| Vector::from_column_slice(&body.velocity)).collect();
-        Self { rule: settings.wall_velocity, body_velocity, viscous_velocity: Vec::new() }
+        Self { rule: settings.wall_velocity, viscous_velocity: Vec::new() }
     }
 
-    /// Velocity of the wall at solid particle `i`.
-    pub fn velocity(&self, particles: &Particles<D>, i: usize) -> Vector<D> {
-        self.body_velocity[particles.body[i] as usize]
-    }
-
-    /// Velocity of solid particle `s` in the viscous term of fluid particle `i`.
+    /// Velocity of solid particle `s` in the viscous term of particle `i`. To one another solids show the wall's velocity.
     #[inline(always)]
     pub fn seen_by(&self, particles: &Particles<D>, s: usize, i: usize) -> Vector<D> {
+        if particles.kind[i] == ParticleKind::Solid {
+            return particles.velocity[s];
+        }
         match self.rule {
             WallVelocity::Paper => particles.velocity[s],
             WallVelocity::Adami => self.viscous_velocity[s],

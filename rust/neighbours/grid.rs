@@ -46,24 +46,25 @@ impl<const D: usize> Default for Grid<D> {
 }
 
 impl<const D: usize> Grid<D> {
-    /// Sort `points`, which must be finite, for searches within `radius`.
-    pub fn build(&mut self, points: &[Vector<D>], radius: f64) {
+    /// Sort `points` for searches within `radius`. Cells cover the box `bounds` at most: points beyond share its border cells,
+    /// so that strays cost no memory.
+    pub fn build(&mut self, points: &[Vector<D>], radius: f64, bounds: (Vector<D>, Vector<D>)) {
         let Some(&first) = points.first() else {
             *self = Self::default();
             return;
         };
         let (lower, upper) = points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
+        let (lower, upper) = (lower.sup(&bounds.0), upper.inf(&bounds.1));
         self.origin = lower;
         // A hair wider, so that rounding cannot put a neighbour one cell farther away.
         let mut width = radius / REACH as f64 * (1.0 + 1e-9);
-        loop {
-            let counts = (upper - lower).map(|extent| (extent / width).floor() + 1.0);
-            if counts.iter().product::<f64>() <= (CELLS_PER_POINT * points.len()).max(64) as f64 {
-                self.cells = std::array::from_fn(|axis| counts[axis] as usize);
-                break;
-            }
+        let most = (CELLS_PER_POINT * points.len()).max(64) as f64;
+        let cells = |width: f64| (upper - lower).map(|extent| (extent.max(0.0) / width).floor() + 1.0);
+        while cells(width).iter().product::<f64>() > most && width.is_finite() {
             width *= 2.0;
         }
+        let counts = cells(width);
+        self.cells = std::array::from_fn(|axis| counts[axis] as usize);
         self.inverse_width = 1.0 / width;
         self.counting_sort(points);
     }

@@ -176,18 +176,6 @@ impl NeighbourList {
         });
     }
 
-    /// `f(i, row, &mut out[i])` for every row, in parallel. Mark `f` `#[inline(always)]`, see [`vectorised`].
-    pub fn for_each_one<A: Send>(&self, out: &mut [A], f: impl Fn(usize, Row<'_>, &mut A) + Sync + Send) {
-        // A vector of () takes no memory.
-        let mut nothing = vec![(); out.len()];
-        self.for_each(
-            out,
-            &mut nothing,
-            #[inline(always)]
-            |i, row, out, ()| f(i, row, out),
-        );
-    }
-
     /// Fill the pairs of every row in parallel.
     pub fn for_each_mut<A: Send, B: Send>(
         &mut self,

@@ -66,7 +66,7 @@ impl<const D: usize> Alsph<D> {
             self.velocity_derivatives(step, particles, frame, walls);
             let (divergence_max, divergence_sum) = self.divergence_norms(particles); // (13)
             let converged = divergence_max <= step.settings.divergence_tolerance;
-            if converged || iteration == step.settings.max_iterations {
+            if converged || iteration == step.settings.max_iterations || !divergence_max.is_finite() {
                 return Outcome { iterations: iteration, converged, divergence_max, divergence_sum };
             }
         }
@@ -83,29 +83,30 @@ impl<const D: usize> Alsph<D> {
         copy(&particles.position[..real], &mut self.position_initial);
         copy(&particles.velocity[..real], &mut self.velocity_initial);
         copy(&particles.pressure[..real], &mut self.pressure_initial);
-        self.divergence_pressure.clear();
-        self.divergence_pressure.extend(particles.pressure.iter().map(|&p| [0.0, p]));
+        self.divergence_pressure.resize(count, [0.0; 2]);
         self.velocity_laplacian.resize(real, Vector::zeros());
         self.velocity_star.resize(count, Vector::zeros());
         self.pressure_laplacian.resize(real, 0.0);
     }
 
-    /// ∇·u^m and ∇²u^m.
+    /// ∇·u^m and ∇²u^m, and p^m beside ∇·u^m.
     fn velocity_derivatives(&mut self, step: Step, particles: &Particles<D>, frame: &Frame<D>, walls: &mut Walls<D>) {
         extrapolate_wall_velocity(step.settings, particles, frame, walls);
         let real = particles.real;
-        let velocity = &particles.velocity;
+        let (velocity, pressure) = (&particles.velocity, &particles.pressure);
         let vector_form = step.settings.velocity_laplacian == VelocityLaplacian::Vector;
         let walls = &*walls;
         frame.stencil.for_each(
             &mut self.divergence_pressure[..real],
             &mut self.velocity_laplacian,
             #[inline(always)]
-            |near, [divergence, _], laplacian| {
-                (*laplacian, *divergence) = near.laplacian_and_divergence(velocity, |s| walls.seen_by(particles, s, near.i));
+            |near, [divergence, p], laplacian| {
+                let solid = |s| walls.seen_by(particles, s, near.i);
+                (*laplacian, *divergence) = near.laplacian_and_divergence(velocity, solid);
                 if vector_form {
-                    *laplacian = near.vector_laplacian(velocity);
+                    *laplacian = near.vector_laplacian(velocity, solid);
                 }
+                *p = pressure[near.i];
             },
         );
         frame.images.scalars(&mut self.divergence_pressure);
@@ -167,12 +168,11 @@ impl<const D: usize> Alsph<D> {
                 }
             },
         );
+        frame.images.scalars(&mut particles.pressure);
         if !paper_walls {
             extrapolate_wall_pressure(settings, particles, frame);
+            frame.images.scalars(&mut particles.pressure);
         }
-        frame.images.scalars(&mut particles.pressure);
-        let pressure = &particles.pressure;
-        parallel::for_each(&mut self.divergence_pressure, |i, fields| fields[1] = pressure[i]);
     }
 
     /// u^{m+1} (11). Buffers and solids keep their velocities.
