@@ -70,7 +70,7 @@ class Case(Parameters):
     shift_coefficient: float = Field(default=0.04, ge=0, le=1, description="β of the maximum_velocity shifting [-]")
     shift_limit: float = Field(default=0.1, gt=0, le=0.5, description="largest shift in a step [Δx]")
     wall_velocity: Literal["paper", "adami", "morris"] = Field(
-        default="adami",
+        default="morris",
         description="velocity of solid particles in the viscous term: the body's own, or extrapolated for no-slip",
     )
     wall_pressure: Literal["paper", "adami"] = Field(
