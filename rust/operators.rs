@@ -79,15 +79,8 @@ impl<const D: usize> Neighbourhood<'_, D> {
     /// ∂u_k/∂x_l as the entry (k, l). (15)
     #[inline(always)]
     pub fn velocity_gradient(&self, field: &[Vector<D>]) -> Matrix<D> {
-        let at_i = field[self.i];
-        let sums = self.sum(
-            self.row.all(),
-            field,
-            #[inline(always)]
-            |_, weight, u, sums| sums.tensor += (u - at_i) * weight.transpose(),
-        );
         // α is symmetric.
-        sums.tensor * self.correction.inverse
+        self.uncorrected_gradient(field) * self.correction.inverse
     }
 
     /// ∂u_k/∂x_l as the entry (k, l), and ∇p. (15)
@@ -107,14 +100,7 @@ impl<const D: usize> Neighbourhood<'_, D> {
     /// ∇·u. (15)
     #[inline(always)]
     pub fn divergence(&self, field: &[Vector<D>]) -> f64 {
-        let at_i = field[self.i];
-        let sums = self.sum(
-            self.row.all(),
-            field,
-            #[inline(always)]
-            |_, weight, u, sums| sums.tensor += (u - at_i) * weight.transpose(),
-        );
-        self.corrected_trace(&sums.tensor)
+        self.corrected_trace(&self.uncorrected_gradient(field))
     }
 
     /// ∇²f, the scalar form of (16).
@@ -182,6 +168,19 @@ impl<const D: usize> Neighbourhood<'_, D> {
         self.row.flowing().iter().for_each(|pair| add(pair, field[pair.j()]));
         self.row.solid().iter().for_each(|pair| add(pair, solid(pair.j())));
         self.correction.inverse * sum * (2.0 * (D as f64 + 2.0))
+    }
+
+    /// Σ slope (u_j − u_i) r_ijᵀ: ∇u before its correction.
+    #[inline(always)]
+    fn uncorrected_gradient(&self, field: &[Vector<D>]) -> Matrix<D> {
+        let at_i = field[self.i];
+        self.sum(
+            self.row.all(),
+            field,
+            #[inline(always)]
+            |_, weight, u, sums| sums.tensor += (u - at_i) * weight.transpose(),
+        )
+        .tensor
     }
 
     /// Σ_kl α⁻¹_kl T_kl.

@@ -54,40 +54,15 @@ pub struct Particles<const D: usize> {
 
 /// Apply `$f` to every array of the particles.
 macro_rules! each_array {
-    ($self:ident, $array:ident => $f:expr) => {{
-        {
-            let $array = &mut $self.position;
+    ($self:ident, $array:ident => $f:expr) => {
+        each_array!(@ $self, $array => $f; position velocity pressure kind body normal depth id)
+    };
+    (@ $self:ident, $array:ident => $f:expr; $($field:ident)*) => {
+        $({
+            let $array = &mut $self.$field;
             $f;
-        }
-        {
-            let $array = &mut $self.velocity;
-            $f;
-        }
-        {
-            let $array = &mut $self.pressure;
-            $f;
-        }
-        {
-            let $array = &mut $self.kind;
-            $f;
-        }
-        {
-            let $array = &mut $self.body;
-            $f;
-        }
-        {
-            let $array = &mut $self.normal;
-            $f;
-        }
-        {
-            let $array = &mut $self.depth;
-            $f;
-        }
-        {
-            let $array = &mut $self.id;
-            $f;
-        }
-    }};
+        })*
+    };
 }
 
 impl<const D: usize> Particles<D> {
