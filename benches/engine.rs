@@ -3,6 +3,8 @@
 //! `cargo bench` prints the throughput in elements a second: pairs for search, stencil and operators, particles for a step.
 
 use alsph::frame::Frame;
+use alsph::lanes::LANES;
+use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, VelocityGradient};
 use alsph::settings::Settings;
 use alsph::{Clock, Matrix, ParticleKind, Particles, Simulation, Vector};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -66,8 +68,13 @@ fn stages(criterion: &mut Criterion) {
         let mut frame = Frame::default();
         frame.search(&settings, &mut particles, 0.0, true);
         let count = particles.real;
-        let pairs = frame.stencil.neighbours.pair_count();
-        println!("{count} particles, {:.1} neighbours each", pairs as f64 / count as f64);
+        let pairs = frame.stencil.neighbours.pair_count(&frame.stencil.position, settings.support_radius());
+        let entries = frame.stencil.neighbours.entry_count();
+        println!(
+            "{count} particles, {:.1} neighbours each, {:.2} lanes a pair",
+            pairs as f64 / count as f64,
+            (LANES * entries) as f64 / pairs as f64
+        );
         let mut group = criterion.benchmark_group("stages");
         group.throughput(Throughput::Elements(pairs as u64)).sample_size(20);
         group.bench_function(BenchmarkId::new("search and stencil", count), |b| {
@@ -85,57 +92,32 @@ fn stages(criterion: &mut Criterion) {
         let mut matrices = vec![Matrix::zeros(); count];
         group.bench_function(BenchmarkId::new("gradient", count), |b| {
             b.iter(|| {
-                stencil.for_each_one(
-                    &mut vectors,
-                    #[inline(always)]
-                    |near, g| *g = near.gradient(&scalar),
-                );
+                stencil.for_each_one(Gradient(&scalar), &mut vectors, |_, value, out| *out = value);
                 black_box(&vectors);
             });
         });
         group.bench_function(BenchmarkId::new("divergence", count), |b| {
             b.iter(|| {
-                stencil.for_each_one(
-                    &mut scalars,
-                    #[inline(always)]
-                    |near, d| *d = near.divergence(velocity),
-                );
+                stencil.for_each_one(Divergence(velocity), &mut scalars, |_, value, out| *out = value);
                 black_box(&scalars);
             });
         });
         group.bench_function(BenchmarkId::new("laplacian and divergence", count), |b| {
             b.iter(|| {
-                stencil.for_each(
-                    &mut vectors,
-                    &mut scalars,
-                    #[inline(always)]
-                    |near, l, d| {
-                        (*l, *d) = near.laplacian_and_divergence(velocity, |s| velocity[s]);
-                    },
-                );
+                let operator = LaplacianAndDivergence { velocity, seen: |s: usize, _: usize| velocity[s] };
+                stencil.for_each(operator, &mut vectors, &mut scalars, |_, value, l, d| (*l, *d) = value);
                 black_box((&vectors, &scalars));
             });
         });
         group.bench_function(BenchmarkId::new("gradient and laplacian", count), |b| {
             b.iter(|| {
-                stencil.for_each(
-                    &mut vectors,
-                    &mut scalars,
-                    #[inline(always)]
-                    |near, g, l| {
-                        (*g, *l) = near.gradient_and_laplacian(&both);
-                    },
-                );
+                stencil.for_each(GradientAndLaplacian(&both), &mut vectors, &mut scalars, |_, value, g, l| (*g, *l) = value);
                 black_box((&vectors, &scalars));
             });
         });
         group.bench_function(BenchmarkId::new("velocity gradient", count), |b| {
             b.iter(|| {
-                stencil.for_each_one(
-                    &mut matrices,
-                    #[inline(always)]
-                    |near, g| *g = near.velocity_gradient(velocity),
-                );
+                stencil.for_each_one(VelocityGradient(velocity), &mut matrices, |_, value, out| *out = value);
                 black_box(&matrices);
             });
         });

@@ -19,7 +19,7 @@ pub fn interpolate<const D: usize>(
     }
     let radius = settings.support_radius();
     let mut near = Vec::new();
-    grid.for_each_run(point, |run| {
+    grid.for_each_run(&[*point], |run| {
         near.extend(run.indices.iter().map(|&j| j as usize).filter(|&j| {
             particles.kind[j] != ParticleKind::Solid && (particles.position[j] - point).norm_squared() < radius * radius
         }));

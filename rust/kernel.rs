@@ -1,10 +1,8 @@
 //! Smoothing kernels W(r, h), normalised in 1-D to 3-D.
 
+use crate::lanes::Real;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
-
-/// Pairs whose kernel is evaluated together.
-pub const BLOCK: usize = 16;
 
 /// A radial kernel W = σ_D / h^D · w(q), q = r/h. Implementations give w and dw/dq without the factor.
 pub trait Kernel: Copy + Send + Sync {
@@ -12,14 +10,8 @@ pub trait Kernel: Copy + Send + Sync {
     const SUPPORT: f64;
     /// σ_D, so that the integral over D-dimensional space is 1.
     fn factor(dimensions: usize) -> f64;
-    fn value(q: f64) -> f64;
-    fn derivative(q: f64) -> f64;
-}
-
-/// max(t, 0) as one instruction: `f64::max` also looks for NaN.
-#[inline(always)]
-fn positive(t: f64) -> f64 {
-    if t > 0.0 { t } else { 0.0 }
+    fn value<R: Real>(q: R) -> R;
+    fn derivative<R: Real>(q: R) -> R;
 }
 
 /// Quintic spline, support 3h (Liu and Liu 2010, the paper's reference 38).
@@ -34,16 +26,17 @@ impl Kernel for QuinticSpline {
     }
 
     #[inline(always)]
-    fn value(q: f64) -> f64 {
-        let [a, b, c] = [3.0 - q, 2.0 - q, 1.0 - q].map(positive);
-        a * (a * a) * (a * a) - 6.0 * b * (b * b) * (b * b) + 15.0 * c * (c * c) * (c * c)
+    fn value<R: Real>(q: R) -> R {
+        let [a, b, c] = [3.0, 2.0, 1.0].map(|knot| (R::splat(knot) - q).positive());
+        let (a2, b2, c2) = (a * a, b * b, c * c);
+        a * (a2 * a2) - R::splat(6.0) * b * (b2 * b2) + R::splat(15.0) * c * (c2 * c2)
     }
 
     #[inline(always)]
-    fn derivative(q: f64) -> f64 {
-        let [a, b, c] = [3.0 - q, 2.0 - q, 1.0 - q].map(positive);
+    fn derivative<R: Real>(q: R) -> R {
+        let [a, b, c] = [3.0, 2.0, 1.0].map(|knot| (R::splat(knot) - q).positive());
         let (a2, b2, c2) = (a * a, b * b, c * c);
-        -5.0 * (a2 * a2 - 6.0 * b2 * b2 + 15.0 * c2 * c2)
+        R::splat(-5.0) * (a2 * a2 - R::splat(6.0) * (b2 * b2) + R::splat(15.0) * (c2 * c2))
     }
 }
 
@@ -59,15 +52,15 @@ impl Kernel for WendlandC2 {
     }
 
     #[inline(always)]
-    fn value(q: f64) -> f64 {
-        let a = positive(1.0 - 0.5 * q);
-        a * a * a * a * (2.0 * q + 1.0)
+    fn value<R: Real>(q: R) -> R {
+        let a = (R::splat(1.0) - R::splat(0.5) * q).positive();
+        a * a * a * a * (R::splat(2.0) * q + R::splat(1.0))
     }
 
     #[inline(always)]
-    fn derivative(q: f64) -> f64 {
-        let a = positive(1.0 - 0.5 * q);
-        -5.0 * q * a * a * a
+    fn derivative<R: Real>(q: R) -> R {
+        let a = (R::splat(1.0) - R::splat(0.5) * q).positive();
+        R::splat(-5.0) * q * a * a * a
     }
 }
 
@@ -83,15 +76,17 @@ impl Kernel for WendlandC4 {
     }
 
     #[inline(always)]
-    fn value(q: f64) -> f64 {
-        let a = positive(1.0 - 0.5 * q);
-        a * (a * a) * (a * a) * a * (35.0 / 12.0 * q * q + 3.0 * q + 1.0)
+    fn value<R: Real>(q: R) -> R {
+        let a = (R::splat(1.0) - R::splat(0.5) * q).positive();
+        let a2 = a * a;
+        a2 * a2 * a2 * (R::splat(35.0 / 12.0) * q * q + R::splat(3.0) * q + R::splat(1.0))
     }
 
     #[inline(always)]
-    fn derivative(q: f64) -> f64 {
-        let a = positive(1.0 - 0.5 * q);
-        -q * a * (a * a) * (a * a) * (14.0 / 3.0) * (1.0 + 2.5 * q)
+    fn derivative<R: Real>(q: R) -> R {
+        let a = (R::splat(1.0) - R::splat(0.5) * q).positive();
+        let a2 = a * a;
+        R::splat(-14.0 / 3.0) * q * a * a2 * a2 * (R::splat(1.0) + R::splat(2.5) * q)
     }
 }
 
@@ -148,27 +143,15 @@ impl<K: Kernel> Smoothing<K> {
 
     /// W(r).
     #[inline(always)]
-    pub fn value(&self, distance: f64) -> f64 {
-        self.factor * K::value(distance * self.inverse_length)
+    pub fn value<R: Real>(&self, distance: R) -> R {
+        R::splat(self.factor) * K::value(distance * R::splat(self.inverse_length))
     }
 
-    /// W(r) and its slope (dW/dr)/r at the distances r whose squares are given. Zero distances must have been replaced by
-    /// small ones. Written on blocks so that the compiler computes several pairs at once.
+    /// (dW/dr) / r, so that ∇_i W_ij = slope · r_ij. `distance` must not be zero.
     #[inline(always)]
-    pub fn evaluate(&self, squares: &[f64; BLOCK], values: &mut [f64; BLOCK], slopes: &mut [f64; BLOCK]) {
-        let slope_factor = self.factor * self.inverse_length;
-        for k in 0..BLOCK {
-            let distance = squares[k].sqrt();
-            let q = distance * self.inverse_length;
-            values[k] = self.factor * K::value(q);
-            slopes[k] = slope_factor * K::derivative(q) / distance;
-        }
-    }
-
-    /// (dW/dr) / r, so that ∇_i W_ij = gradient_over_distance · r_ij. `distance` must not be zero.
-    #[inline(always)]
-    pub fn gradient_over_distance(&self, distance: f64) -> f64 {
-        self.factor * self.inverse_length * K::derivative(distance * self.inverse_length) / distance
+    pub fn slope<R: Real>(&self, distance: R) -> R {
+        let derivative = K::derivative(distance * R::splat(self.inverse_length));
+        R::splat(self.factor * self.inverse_length) * derivative / distance
     }
 }
 

@@ -9,6 +9,7 @@ pub mod error;
 pub mod frame;
 mod interpolation;
 pub mod kernel;
+pub mod lanes;
 pub mod loads;
 pub mod neighbours;
 pub mod operators;

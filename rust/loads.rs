@@ -85,9 +85,10 @@ fn force_on<const D: usize>(
     let stencil = &frame.stencil;
     let viscosity = settings.density * settings.kinematic_viscosity;
     let (mut pressure, mut viscous) = (Vector::zeros(), Vector::zeros());
-    for pair in stencil.neighbours.row(s).flowing() {
-        let f = pair.j();
-        let slope = pair.slope();
+    let (row, lane) = stencil.neighbours.row(s);
+    for entry in row.flowing() {
+        let f = entry.j();
+        let slope = entry.slope(lane);
         let r_sf = stencil.position[s] - stencil.position[f];
         pressure -= r_sf * (slope * (particles.pressure[s] + particles.pressure[f]));
         let seen = walls.seen_by(particles, s, f);

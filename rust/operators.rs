@@ -1,191 +1,208 @@
-//! Derivatives at a particle. (15) (16)
+//! Derivatives at the particles. (15) (16)
 //!
 //! Every operator sums weights times differences, so a constant field has derivatives of exactly zero, and corrects the sum
 //! with the tensor made of the same weights, so a linear field has its exact gradient.
 
-use crate::neighbours::{Pair, Row};
+use crate::lanes::{LANES, Lanes, add_product, from, matrices, vectors};
+use crate::neighbours::{Cluster, Entry, Row};
 use crate::particles::{Matrix, Vector};
-use crate::stencil::Correction;
+use crate::stencil::{Correction, Stencil};
 
-/// A particle and all that its derivatives need beside the field.
+/// What the operators read of a cluster and its neighbours.
 #[derive(Clone, Copy)]
 pub struct Neighbourhood<'a, const D: usize> {
-    pub i: usize,
+    pub cluster: Cluster,
     pub row: Row<'a>,
     /// Positions of the frame.
     pub position: &'a [Vector<D>],
-    pub correction: &'a Correction<D>,
+    pub correction: &'a [Correction<D>],
 }
 
-/// Sums of one pass over the pairs.
-#[derive(Clone, Copy)]
-struct Sums<const D: usize> {
-    /// Σ slope r_ij (f_j − f_i), and for a vector field its outer product.
-    gradient: Vector<D>,
-    tensor: Matrix<D>,
-    /// Σ slope (f_j − f_i).
-    scalar: f64,
-    vector: Vector<D>,
+/// A quantity formed from the neighbours of every particle.
+pub trait Operator<const D: usize>: Sync {
+    type Value;
+
+    /// The value at the particle of each lane. Mark `#[inline(always)]`, see [`crate::lanes::Task`].
+    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [Self::Value; LANES];
 }
 
-impl<const D: usize> Sums<D> {
-    #[inline(always)]
-    fn zeros() -> Self {
-        Self { gradient: Vector::zeros(), tensor: Matrix::zeros(), scalar: 0.0, vector: Vector::zeros() }
-    }
+/// ∇f. (15)
+pub struct Gradient<'a>(pub &'a [f64]);
+
+/// ∂u_k/∂x_l as the entry (k, l). (15)
+pub struct VelocityGradient<'a, const D: usize>(pub &'a [Vector<D>]);
+
+/// ∇·u. (15)
+pub struct Divergence<'a, const D: usize>(pub &'a [Vector<D>]);
+
+/// ∇f of the first entry of a field of pairs and ∇²g of the second, the scalar form of (16).
+pub struct GradientAndLaplacian<'a>(pub &'a [[f64; 2]]);
+
+/// ∇²u, component by component, and ∇·u. In the Laplacian of particle i the solid neighbour s shows the velocity `seen(s, i)`.
+pub struct LaplacianAndDivergence<'a, const D: usize, F> {
+    pub velocity: &'a [Vector<D>],
+    pub seen: F,
 }
 
 impl<const D: usize> Neighbourhood<'_, D> {
-    /// Add up `add(slope, slope · r_ij, field_j, sums)` over `pairs`, in two sets of sums at a time. Entries that `add` never
-    /// touches cost nothing.
+    /// Call `add(j, slope, r_ij)` for each of `entries`.
     #[inline(always)]
-    fn sum<T>(&self, pairs: &[Pair], field: &[T], add: impl Fn(f64, Vector<D>, &T, &mut Sums<D>)) -> Sums<D> {
-        let here = self.position[self.i];
-        let mut even = Sums::zeros();
-        let mut odd = Sums::zeros();
-        let one = |pair: &Pair, sums: &mut Sums<D>| {
-            let slope = pair.slope();
-            add(slope, (here - self.position[pair.j()]) * slope, &field[pair.j()], sums);
-        };
-        let mut twos = pairs.chunks_exact(2);
-        for two in &mut twos {
-            one(&two[0], &mut even);
-            one(&two[1], &mut odd);
-        }
-        if let [last] = twos.remainder() {
-            one(last, &mut even);
-        }
-        Sums {
-            gradient: even.gradient + odd.gradient,
-            tensor: even.tensor + odd.tensor,
-            scalar: even.scalar + odd.scalar,
-            vector: even.vector + odd.vector,
+    pub fn for_each<V: Lanes>(&self, entries: &[Entry], mut add: impl FnMut(usize, V, [V; D])) {
+        let here: [V; D] = self.cluster.vectors(self.position);
+        for entry in entries {
+            add(entry.j(), entry.slopes(), from(here, &self.position[entry.j()]));
         }
     }
 
-    /// ∇f. (15)
+    /// The correction of each lane.
     #[inline(always)]
-    pub fn gradient(&self, field: &[f64]) -> Vector<D> {
-        let at_i = field[self.i];
-        let sums = self.sum(
-            self.row.all(),
-            field,
+    pub fn corrections(&self) -> [&Correction<D>; LANES] {
+        self.cluster.particles().map(|i| &self.correction[i])
+    }
+}
+
+impl<const D: usize> Operator<D> for Gradient<'_> {
+    type Value = Vector<D>;
+
+    #[inline(always)]
+    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [Vector<D>; LANES] {
+        let here: V = near.cluster.lanes(|i| self.0[i]);
+        let mut gradient = [V::zero(); D];
+        near.for_each(
+            near.row.all(),
             #[inline(always)]
-            |_, weight, f, sums| sums.gradient += weight * (f - at_i),
+            |j, slope: V, r_ij| {
+                let difference = (V::splat(self.0[j]) - here) * slope;
+                add_product(&mut gradient, difference, r_ij);
+            },
         );
-        self.correction.inverse * sums.gradient
+        corrected(near, gradient)
     }
+}
 
-    /// ∂u_k/∂x_l as the entry (k, l). (15)
+impl<const D: usize> Operator<D> for VelocityGradient<'_, D> {
+    type Value = Matrix<D>;
+
     #[inline(always)]
-    pub fn velocity_gradient(&self, field: &[Vector<D>]) -> Matrix<D> {
+    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [Matrix<D>; LANES] {
+        let (tensor, corrections) = (matrices(uncorrected_gradient::<V, D>(near, self.0)), near.corrections());
         // α is symmetric.
-        self.uncorrected_gradient(field) * self.correction.inverse
+        std::array::from_fn(|lane| tensor[lane] * corrections[lane].inverse)
     }
+}
 
-    /// ∂u_k/∂x_l as the entry (k, l), and ∇p. (15)
+impl<const D: usize> Operator<D> for Divergence<'_, D> {
+    type Value = f64;
+
     #[inline(always)]
-    pub fn velocity_and_pressure_gradient(&self, velocity: &[Vector<D>], pressure: &[f64]) -> (Matrix<D>, Vector<D>) {
-        let (u_i, p_i) = (velocity[self.i], pressure[self.i]);
-        let mut tensor = Matrix::zeros();
-        let mut gradient = Vector::zeros();
-        for pair in self.row.all() {
-            let weight = (self.position[self.i] - self.position[pair.j()]) * pair.slope();
-            tensor += (velocity[pair.j()] - u_i) * weight.transpose();
-            gradient += weight * (pressure[pair.j()] - p_i);
-        }
-        (tensor * self.correction.inverse, self.correction.inverse * gradient)
+    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [f64; LANES] {
+        corrected_trace(near, uncorrected_gradient::<V, D>(near, self.0))
     }
+}
 
-    /// ∇·u. (15)
-    #[inline(always)]
-    pub fn divergence(&self, field: &[Vector<D>]) -> f64 {
-        self.corrected_trace(&self.uncorrected_gradient(field))
-    }
+impl<const D: usize> Operator<D> for GradientAndLaplacian<'_> {
+    type Value = (Vector<D>, f64);
 
-    /// ∇²f, the scalar form of (16).
     #[inline(always)]
-    pub fn laplacian(&self, field: &[f64]) -> f64 {
-        let at_i = field[self.i];
-        let sums = self.sum(
-            self.row.all(),
-            field,
+    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [(Vector<D>, f64); LANES] {
+        let here: [V; 2] = [near.cluster.lanes(|i| self.0[i][0]), near.cluster.lanes(|i| self.0[i][1])];
+        let (mut gradient, mut laplacian) = ([V::zero(); D], V::zero());
+        near.for_each(
+            near.row.all(),
             #[inline(always)]
-            |slope, _, f, sums| sums.scalar += slope * (f - at_i),
-        );
-        self.correction.laplacian * sums.scalar
-    }
-
-    /// ∇²u, component by component, and ∇·u. In the Laplacian solid neighbours show the velocity that `solid` gives.
-    #[inline(always)]
-    pub fn laplacian_and_divergence(&self, field: &[Vector<D>], solid: impl Fn(usize) -> Vector<D>) -> (Vector<D>, f64) {
-        let at_i = field[self.i];
-        let flowing = self.sum(
-            self.row.flowing(),
-            field,
-            #[inline(always)]
-            |slope, weight, u, sums| {
-                let difference = u - at_i;
-                sums.tensor += difference * weight.transpose();
-                sums.vector += difference * slope;
+            |j, slope: V, r_ij| {
+                let [f, g] = self.0[j];
+                add_product(&mut gradient, (V::splat(f) - here[0]) * slope, r_ij);
+                laplacian += (V::splat(g) - here[1]) * slope;
             },
         );
-        let (mut tensor, mut vector) = (flowing.tensor, flowing.vector);
-        for pair in self.row.solid() {
-            let weight = (self.position[self.i] - self.position[pair.j()]) * pair.slope();
-            tensor += (field[pair.j()] - at_i) * weight.transpose();
-            vector += (solid(pair.j()) - at_i) * pair.slope();
-        }
-        (vector * self.correction.laplacian, self.corrected_trace(&tensor))
+        let (gradient, laplacian, corrections) = (corrected(near, gradient), laplacian.store(), near.corrections());
+        std::array::from_fn(|lane| (gradient[lane], corrections[lane].laplacian * laplacian[lane]))
     }
+}
 
-    /// ∇f of the first entry of a field of pairs and ∇²g of the second.
+impl<const D: usize, F: Fn(usize, usize) -> Vector<D> + Sync> Operator<D> for LaplacianAndDivergence<'_, D, F> {
+    type Value = (Vector<D>, f64);
+
     #[inline(always)]
-    pub fn gradient_and_laplacian(&self, field: &[[f64; 2]]) -> (Vector<D>, f64) {
-        let at_i = field[self.i];
-        let sums = self.sum(
-            self.row.all(),
-            field,
+    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [(Vector<D>, f64); LANES] {
+        let velocity = self.velocity;
+        let here: [V; D] = near.cluster.vectors(velocity);
+        let (mut laplacian, mut tensor) = ([V::zero(); D], [[V::zero(); D]; D]);
+        near.for_each(
+            near.row.flowing(),
             #[inline(always)]
-            |slope, weight, [f, g], sums| {
-                sums.gradient += weight * (f - at_i[0]);
-                sums.scalar += slope * (g - at_i[1]);
+            |j, slope: V, r_ij| {
+                for k in 0..D {
+                    let difference = (V::splat(velocity[j][k]) - here[k]) * slope;
+                    laplacian[k] += difference;
+                    add_product(&mut tensor[k], difference, r_ij);
+                }
             },
         );
-        (self.correction.inverse * sums.gradient, self.correction.laplacian * sums.scalar)
-    }
-
-    /// ∇²u + 2∇(∇·u), which (16) gives as printed: the vector form with the correction tensor. Solid neighbours show the
-    /// velocity that `solid` gives.
-    #[inline(always)]
-    pub fn vector_laplacian(&self, field: &[Vector<D>], solid: impl Fn(usize) -> Vector<D>) -> Vector<D> {
-        let mut sum = Vector::zeros();
-        let mut add = |pair: &Pair, u_j: Vector<D>| {
-            let r_ij = self.position[self.i] - self.position[pair.j()];
-            let radial = (field[self.i] - u_j).dot(&r_ij) / r_ij.norm_squared().max(f64::MIN_POSITIVE);
-            sum += r_ij * (radial * pair.slope());
-        };
-        self.row.flowing().iter().for_each(|pair| add(pair, field[pair.j()]));
-        self.row.solid().iter().for_each(|pair| add(pair, solid(pair.j())));
-        self.correction.inverse * sum * (2.0 * (D as f64 + 2.0))
-    }
-
-    /// Σ slope (u_j − u_i) r_ijᵀ: ∇u before its correction.
-    #[inline(always)]
-    fn uncorrected_gradient(&self, field: &[Vector<D>]) -> Matrix<D> {
-        let at_i = field[self.i];
-        self.sum(
-            self.row.all(),
-            field,
+        near.for_each(
+            near.row.solid(),
             #[inline(always)]
-            |_, weight, u, sums| sums.tensor += (u - at_i) * weight.transpose(),
-        )
-        .tensor
+            |s, slope: V, r_ij| {
+                let seen = near.cluster.particles().map(|i| (self.seen)(s, i));
+                for k in 0..D {
+                    laplacian[k] += (V::load(&seen.map(|u| u[k])) - here[k]) * slope;
+                    add_product(&mut tensor[k], (V::splat(velocity[s][k]) - here[k]) * slope, r_ij);
+                }
+            },
+        );
+        let (laplacian, divergence, corrections) = (vectors(laplacian), corrected_trace(near, tensor), near.corrections());
+        std::array::from_fn(|lane| (laplacian[lane] * corrections[lane].laplacian, divergence[lane]))
     }
+}
 
-    /// Σ_kl α⁻¹_kl T_kl.
-    #[inline(always)]
-    fn corrected_trace(&self, tensor: &Matrix<D>) -> f64 {
-        tensor.component_mul(&self.correction.inverse).sum()
-    }
+/// ∇²u + 2∇(∇·u) at particle `i`, which (16) gives as printed: the vector form with the correction tensor. Solid neighbours
+/// show the velocity that `solid` gives.
+pub fn vector_laplacian<const D: usize>(
+    stencil: &Stencil<D>,
+    velocity: &[Vector<D>],
+    i: usize,
+    solid: impl Fn(usize) -> Vector<D>,
+) -> Vector<D> {
+    let (row, lane) = stencil.neighbours.row(i);
+    let mut sum = Vector::zeros();
+    let mut add = |entry: &Entry, u_j: Vector<D>| {
+        let r_ij = stencil.position[i] - stencil.position[entry.j()];
+        let radial = (velocity[i] - u_j).dot(&r_ij) / r_ij.norm_squared().max(f64::MIN_POSITIVE);
+        sum += r_ij * (radial * entry.slope(lane));
+    };
+    row.flowing().iter().for_each(|entry| add(entry, velocity[entry.j()]));
+    row.solid().iter().for_each(|entry| add(entry, solid(entry.j())));
+    stencil.correction[i].inverse * sum * (2.0 * (D as f64 + 2.0))
+}
+
+/// Σ slope (u_j − u_i) r_ijᵀ: ∇u before its correction.
+#[inline(always)]
+pub fn uncorrected_gradient<V: Lanes, const D: usize>(near: Neighbourhood<D>, field: &[Vector<D>]) -> [[V; D]; D] {
+    let here: [V; D] = near.cluster.vectors(field);
+    let mut tensor = [[V::zero(); D]; D];
+    near.for_each(
+        near.row.all(),
+        #[inline(always)]
+        |j, slope: V, r_ij| {
+            for k in 0..D {
+                add_product(&mut tensor[k], (V::splat(field[j][k]) - here[k]) * slope, r_ij);
+            }
+        },
+    );
+    tensor
+}
+
+/// α⁻¹ times a vector.
+#[inline(always)]
+pub fn corrected<V: Lanes, const D: usize>(near: Neighbourhood<D>, sum: [V; D]) -> [Vector<D>; LANES] {
+    let (sum, corrections) = (vectors(sum), near.corrections());
+    std::array::from_fn(|lane| corrections[lane].inverse * sum[lane])
+}
+
+/// Σ_kl α⁻¹_kl T_kl.
+#[inline(always)]
+fn corrected_trace<V: Lanes, const D: usize>(near: Neighbourhood<D>, tensor: [[V; D]; D]) -> [f64; LANES] {
+    let (tensor, corrections) = (matrices(tensor), near.corrections());
+    std::array::from_fn(|lane| tensor[lane].component_mul(&corrections[lane].inverse).sum())
 }

@@ -1,12 +1,9 @@
 //! Fixed chunks of particles: the unit of parallel work, and of sums that do not depend on the number of threads.
-//!
-//! Loops over pairs run through [`vectorised`], which compiles them a second time for AVX2 and picks at run time. No operation
-//! is fused or reordered for it, so the results are the same to the last bit.
 
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Particles a task. Fixed, because sums are formed chunk by chunk.
+/// Particles a task, a whole number of clusters. Fixed, because sums are formed chunk by chunk.
 pub const CHUNK: usize = 256;
 
 /// Map each chunk of `0..count` in parallel, then fold the results in order.
@@ -26,27 +23,4 @@ pub fn for_each<T: Send>(out: &mut [T], f: impl Fn(usize, &mut T) + Sync + Send)
             f(chunk * CHUNK + k, value);
         }
     });
-}
-
-/// Run `f`, compiled for the vector instructions that this machine has. `f` and all it calls must be inlined, so mark the
-/// closure `#[inline(always)]`.
-#[inline(always)]
-pub fn vectorised<R>(f: impl FnOnce() -> R) -> R {
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2")
-        && is_x86_feature_detected!("bmi1")
-        && is_x86_feature_detected!("bmi2")
-        && is_x86_feature_detected!("lzcnt")
-        && is_x86_feature_detected!("popcnt")
-    {
-        // SAFETY: the machine has the features that `with_avx2` is compiled for.
-        return unsafe { with_avx2(f) };
-    }
-    f()
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn with_avx2<R>(f: impl FnOnce() -> R) -> R {
-    f()
 }

@@ -1,6 +1,7 @@
 //! The extension module `alsph._alsph`: the only file that knows Python.
 
-use crate::neighbours::Pair;
+use crate::lanes::LANES;
+use crate::neighbours::Entry;
 use crate::particles::Matrix;
 use crate::{Clock, Error, ParticleKind, Particles, Report, Settings, Simulation, Vector};
 use numpy::ndarray::Array2;
@@ -201,12 +202,13 @@ fn time_step_limits<'py>(py: Python<'py>, settings: &str, velocity_max: f64) -> 
 fn bytes_per_particle(settings: &str) -> PyResult<f64> {
     let settings = Settings::from_json(settings)?;
     let ratio = settings.support_radius() / settings.particle_spacing;
-    let (pairs, pair, fields) = match settings.dimensions {
-        2 => (std::f64::consts::PI * ratio * ratio, size_of::<Pair>(), 16 * size_of::<Vector<2>>()),
-        _ => (4.0 / 3.0 * std::f64::consts::PI * ratio.powi(3), size_of::<Pair>(), 16 * size_of::<Vector<3>>()),
+    // Neighbours of four particles: a sphere widened by the distance between them.
+    let (neighbours, fields) = match settings.dimensions {
+        2 => (std::f64::consts::PI * (ratio + 0.9).powi(2), 16 * size_of::<Vector<2>>()),
+        _ => (4.0 / 3.0 * std::f64::consts::PI * (ratio + 0.9).powi(3), 16 * size_of::<Vector<3>>()),
     };
     // The rows grow by doubling, so half of their room may be empty.
-    Ok(1.5 * pairs * pair as f64 + fields as f64 + 100.0)
+    Ok(1.5 * neighbours * (size_of::<Entry>() / LANES) as f64 + fields as f64 + 100.0)
 }
 
 #[pymodule]

@@ -185,7 +185,7 @@ impl Settings {
                 .map(|r| {
                     let distance = r.iter().map(|x| x * x).sum::<f64>().sqrt();
                     let value = smoothing.value(distance);
-                    let slope = if distance > 0.0 { smoothing.gradient_over_distance(distance) } else { 0.0 };
+                    let slope = if distance > 0.0 { smoothing.slope(distance) } else { 0.0 };
                     (r, distance, value, slope)
                 })
                 .collect::<Vec<_>>()

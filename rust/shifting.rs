@@ -1,8 +1,9 @@
 //! Artificial particle displacement. (18) (19)
 
 use crate::frame::Frame;
-use crate::kernel::{BLOCK, Kernel, Smoothing};
-use crate::neighbours::Row;
+use crate::kernel::{Kernel, Smoothing};
+use crate::lanes::{LANES, Lanes, add_product, from, matrices, norm_squared, vectors};
+use crate::operators::{Neighbourhood, Operator};
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{Settings, Shifting};
@@ -20,9 +21,16 @@ pub fn shift<const D: usize>(
     if settings.shifting == Shifting::None {
         return;
     }
-    let change = with_kernel!(settings.kernel, K => {
+    let mut change = vec![(Vector::zeros(), Vector::zeros(), 0.0); particles.real];
+    with_kernel!(settings.kernel, K => {
         let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
-        displacements(settings, kernel, particles, frame, time_step, velocity_max)
+        let operator = Displacement { settings, kernel, particles, time_step, velocity_max };
+        let kind = &particles.kind;
+        frame.stencil.for_each_one(operator, &mut change, |i, value, change| {
+            if kind[i] == ParticleKind::Fluid {
+                *change = value;
+            }
+        });
     });
     let Particles { real, position, velocity, pressure, .. } = particles;
     parallel::for_each(&mut position[..*real], |i, r| *r += change[i].0);
@@ -30,86 +38,80 @@ pub fn shift<const D: usize>(
     parallel::for_each(&mut pressure[..*real], |i, p| *p += change[i].2);
 }
 
-/// δr, δr·∇u and δr·∇p of every real particle.
-fn displacements<K: Kernel, const D: usize>(
-    settings: &Settings,
+/// δr, δr·∇u and δr·∇p.
+type Change<const D: usize> = (Vector<D>, Vector<D>, f64);
+
+/// Displacement of every particle if it were fluid.
+struct Displacement<'a, K, const D: usize> {
+    settings: &'a Settings,
     kernel: Smoothing<K>,
-    particles: &Particles<D>,
-    frame: &Frame<D>,
+    particles: &'a Particles<D>,
     time_step: f64,
     velocity_max: f64,
-) -> Vec<(Vector<D>, Vector<D>, f64)> {
-    let limit = settings.shift_limit * settings.particle_spacing;
-    let mut change = vec![(Vector::zeros(), Vector::zeros(), 0.0); particles.real];
-    frame.stencil.for_each_one(
-        &mut change,
-        #[inline(always)]
-        |near, (shift, du, dp)| {
-            let i = near.i;
-            if particles.kind[i] != ParticleKind::Fluid {
-                return;
-            }
-            let local = Surroundings::of(settings, kernel, particles, near.row, i);
-            let speed = match settings.shifting {
-                Shifting::Xsph => local.relative_speed,
-                _ => settings.shift_coefficient * velocity_max,
-            };
-            *shift = local.asymmetry * (local.mean_distance * local.mean_distance * speed * time_step);
-            let length = shift.norm();
-            if length > limit {
-                *shift *= limit / length;
-            }
-            let (velocity_gradient, pressure_gradient) =
-                near.velocity_and_pressure_gradient(&particles.velocity, &particles.pressure);
-            *du = velocity_gradient * *shift;
-            *dp = pressure_gradient.dot(shift);
-        },
-    );
-    change
 }
 
-/// The sums of (18) at one particle.
-struct Surroundings<const D: usize> {
-    /// Σ r_ij / r_ij³.
-    asymmetry: Vector<D>,
-    /// r_0.
-    mean_distance: f64,
-    /// u_v.
-    relative_speed: f64,
-}
+impl<K: Kernel, const D: usize> Operator<D> for Displacement<'_, K, D> {
+    type Value = Change<D>;
 
-impl<const D: usize> Surroundings<D> {
     #[inline(always)]
-    fn of<K: Kernel>(settings: &Settings, kernel: Smoothing<K>, particles: &Particles<D>, row: Row, i: usize) -> Self {
-        let limit = settings.support_radius().powi(2);
-        let smallest = 1e-12 * limit;
-        let (mut asymmetry, mut relative) = (Vector::zeros(), Vector::zeros());
-        let (mut total, mut distances, mut count) = (kernel.value(0.0), 0.0, 0.0);
-        for block in row.all().chunks(BLOCK) {
-            let mut squares = [limit; BLOCK];
-            let (mut values, mut slopes) = ([0.0; BLOCK], [0.0; BLOCK]);
-            for (square, pair) in squares.iter_mut().zip(block) {
-                *square = (particles.position[i] - particles.position[pair.j()]).norm_squared().max(smallest);
-            }
-            kernel.evaluate(&squares, &mut values, &mut slopes);
-            let mut lengths = squares.map(f64::sqrt);
-            let mut inverse_cubes: [f64; BLOCK] = std::array::from_fn(|k| 1.0 / (squares[k] * lengths[k]));
-            for k in 0..BLOCK {
-                // Beyond the support: in the list only for its skin, or an unused entry of the block.
-                let inside = f64::from(u8::from(squares[k] < limit));
-                lengths[k] *= inside;
-                inverse_cubes[k] *= inside;
+    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [Change<D>; LANES] {
+        let Particles { position, velocity, pressure, .. } = self.particles;
+        let here: [V; D] = near.cluster.vectors(position);
+        let (u, p): ([V; D], V) = (near.cluster.vectors(velocity), near.cluster.lanes(|i| pressure[i]));
+        let limit = self.settings.support_radius().powi(2);
+        let (limit, smallest) = (V::splat(limit), V::splat(1e-12 * limit));
+        // Σ r_ij / r_ij³, Σ W u_ij, Σ W, Σ r_ij and the number of neighbours of (18), and the gradients for (19).
+        let (mut asymmetry, mut relative) = ([V::zero(); D], [V::zero(); D]);
+        let (mut total, mut distances, mut count) = (V::zero(), V::zero(), V::zero());
+        let (mut velocity_gradient, mut pressure_gradient) = ([[V::zero(); D]; D], [V::zero(); D]);
+        near.for_each(
+            near.row.all(),
+            #[inline(always)]
+            |j, slope: V, r_ij_of_frame| {
+                let r_ij = from(here, &position[j]);
+                let square = norm_squared(r_ij) + smallest;
+                let distance = square.sqrt();
+                // The row also holds particles beyond the support of this lane, which must not count.
+                let inside = norm_squared(r_ij_of_frame).below(limit);
+                add_product(&mut asymmetry, inside / (square * distance), r_ij);
+                distances += inside * distance;
                 count += inside;
-            }
-            for (k, pair) in block.iter().enumerate() {
-                let j = pair.j();
-                asymmetry += (particles.position[i] - particles.position[j]) * inverse_cubes[k];
-                relative += (particles.velocity[i] - particles.velocity[j]) * values[k];
-            }
-            total += values.iter().sum::<f64>();
-            distances += lengths.iter().sum::<f64>();
-        }
-        let mean_distance = if count > 0.0 { distances / count } else { 0.0 };
-        Self { asymmetry, mean_distance, relative_speed: relative.norm() / total }
+                let u_ij = from(u, &velocity[j]);
+                let weight = inside * self.kernel.value(distance);
+                add_product(&mut relative, weight, u_ij);
+                total += weight;
+                for k in 0..D {
+                    // Minus u_ij, because ∇u sums u_j − u_i.
+                    add_product(&mut velocity_gradient[k], (V::zero() - u_ij[k]) * slope, r_ij_of_frame);
+                }
+                add_product(&mut pressure_gradient, (V::splat(pressure[j]) - p) * slope, r_ij_of_frame);
+            },
+        );
+        let (asymmetry, relative) = (vectors(asymmetry), vectors(relative));
+        let [total, distances, count] = [total, distances, count].map(V::store);
+        let (velocity_gradient, pressure_gradient) = (matrices(velocity_gradient), vectors(pressure_gradient));
+        let corrections = near.corrections();
+        std::array::from_fn(|lane| {
+            // The particle itself is in the list: it is counted, and adds next to nothing to the other sums.
+            let others = count[lane] - 1.0;
+            let mean_distance = if others > 0.0 { distances[lane] / others } else { 0.0 };
+            let relative_speed = relative[lane].norm() / total[lane];
+            let shift = self.limited(asymmetry[lane], mean_distance, relative_speed);
+            let carried = corrections[lane].inverse * shift;
+            (shift, velocity_gradient[lane] * carried, pressure_gradient[lane].dot(&carried))
+        })
+    }
+}
+
+impl<K, const D: usize> Displacement<'_, K, D> {
+    /// δr (18), never longer than the limit.
+    fn limited(&self, asymmetry: Vector<D>, mean_distance: f64, relative_speed: f64) -> Vector<D> {
+        let speed = match self.settings.shifting {
+            Shifting::Xsph => relative_speed,
+            _ => self.settings.shift_coefficient * self.velocity_max,
+        };
+        let shift = asymmetry * (mean_distance * mean_distance * speed * self.time_step);
+        let (length, limit) = (shift.norm(), self.settings.shift_limit * self.settings.particle_spacing);
+        if length > limit { shift * (limit / length) } else { shift }
     }
 }

@@ -6,6 +6,7 @@ use crate::frame::Frame;
 use crate::interpolation::interpolate;
 use crate::loads::loads;
 use crate::neighbours::Grid;
+use crate::operators::VelocityGradient;
 use crate::parallel;
 use crate::particles::{Matrix, ParticleKind, Particles, Vector};
 use crate::report::{Clock, Report};
@@ -232,13 +233,8 @@ impl<const D: usize> Simulation<D> {
             simulation.prepare();
             let particles = &simulation.particles;
             let mut gradient = vec![Matrix::zeros(); particles.real];
-            simulation.frame.stencil.for_each_one(
-                &mut gradient,
-                #[inline(always)]
-                |near, gradient| {
-                    *gradient = near.velocity_gradient(&particles.velocity);
-                },
-            );
+            let operator = VelocityGradient(&particles.velocity);
+            simulation.frame.stencil.for_each_one(operator, &mut gradient, |_, value, gradient| *gradient = value);
             Snapshot { volume: simulation.frame.stencil.volume[..particles.real].to_vec(), velocity_gradient: gradient }
         })
     }
@@ -357,7 +353,7 @@ fn check_spacing<const D: usize>(settings: &Settings, particles: &Particles<D>) 
     let mut grid = Grid::default();
     grid.build(&particles.position, settings.support_radius(), settings.bounds());
     let mut candidates = 0;
-    particles.position.iter().for_each(|point| grid.for_each_run(point, |run| candidates += run.indices.len()));
+    particles.position.iter().for_each(|point| grid.for_each_run(&[*point], |run| candidates += run.indices.len()));
     let mean = candidates as f64 / particles.len() as f64;
     let expected = (2.5 * settings.support_radius() / settings.particle_spacing).powi(D as i32);
     if mean > MOST * expected + 64.0 {

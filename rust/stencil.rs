@@ -1,17 +1,15 @@
 //! The stencil: all that the derivatives need to know of the particle positions of one frame. (14) (17)
 
-use crate::kernel::{BLOCK, Kernel, Smoothing};
-use crate::neighbours::{NeighbourList, Row, Slope};
-use crate::operators::Neighbourhood;
+use crate::kernel::{Kernel, Smoothing};
+use crate::lanes::{Lanes, add_product, from, matrices, norm_squared};
+use crate::neighbours::{Cluster, Entry, NeighbourList, Row, Visit, VisitMut};
+use crate::operators::{Neighbourhood, Operator};
 use crate::particles::{Matrix, Particles, Vector};
 use crate::settings::Settings;
 use crate::with_kernel;
 
 /// Inverse correction tensors with a larger norm are taken for singular: too few neighbours for a gradient.
 const SINGULAR: f64 = 1e3;
-
-/// The square of a distance at which every kernel is zero, for the unused entries of a block.
-const FAR: f64 = 1e100;
 
 #[derive(Debug, Default)]
 pub struct Stencil<const D: usize> {
@@ -39,94 +37,112 @@ impl<const D: usize> Stencil<D> {
         self.position.clone_from(&particles.position);
         self.volume.resize(particles.len(), 0.0);
         self.correction.resize(particles.real, Correction::of(&Matrix::identity()));
-        with_kernel!(settings.kernel, K => self.volumes(Smoothing::<K>::new(settings.smoothing_length(), D), settings.particle_spacing.powi(D as i32)));
+        let (position, real) = (&self.position, particles.real);
+        // The slopes first hold the nominal volume Δx^D in the place of V_j, lest f32 overflow in small units.
+        let nominal = settings.particle_spacing.powi(D as i32);
+        with_kernel!(settings.kernel, K => {
+            let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
+            self.neighbours.for_each_mut(&mut self.volume[..real], Volumes { kernel, position, nominal });
+        });
         mirror(&mut self.volume);
-        self.corrections(settings.particle_spacing.powi(D as i32));
+        self.neighbours.for_each_mut(&mut self.correction, Corrections { position, volume: &self.volume, nominal });
     }
 
-    /// V_i, and the slopes with the nominal volume Δx^D in the place of V_j, lest f32 overflow in small units.
-    fn volumes<K: Kernel>(&mut self, kernel: Smoothing<K>, nominal: f64) {
-        let position = &self.position;
-        let real = self.correction.len();
-        self.neighbours.for_each_mut(
-            &mut self.volume[..real],
-            &mut vec![(); real],
-            #[inline(always)]
-            |i, pairs, volume, ()| {
-                let mut sum = kernel.value(0.0);
-                for block in pairs.chunks_mut(BLOCK) {
-                    let (mut squares, mut values, mut slopes) = ([FAR; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
-                    for (square, pair) in squares.iter_mut().zip(&*block) {
-                        *square = (position[i] - position[pair.j()]).norm_squared().max(f64::MIN_POSITIVE);
-                    }
-                    kernel.evaluate(&squares, &mut values, &mut slopes);
-                    sum += values.iter().sum::<f64>();
-                    for (slope, pair) in slopes.iter().zip(block) {
-                        pair.slope = (nominal * slope) as Slope;
-                    }
-                }
-                *volume = 1.0 / sum;
-            },
-        );
-    }
-
-    /// V_j into the slopes, and the correction tensor (17) from the slopes as stored.
-    fn corrections(&mut self, nominal: f64) {
-        let (volume, position) = (&self.volume, &self.position);
-        let real = self.correction.len();
-        self.neighbours.for_each_mut(
-            &mut self.correction,
-            &mut vec![(); real],
-            #[inline(always)]
-            |i, pairs, correction, ()| {
-                let mut alpha = Matrix::<D>::zeros();
-                for pair in pairs {
-                    let r_ij = position[i] - position[pair.j()];
-                    pair.slope = (volume[pair.j()] / nominal * pair.slope()) as Slope;
-                    alpha -= r_ij * r_ij.transpose() * pair.slope();
-                }
-                *correction = Correction::of(&alpha);
-            },
-        );
-    }
-
-    /// `f(neighbourhood of i, &mut a[i], &mut b[i])` for every real particle, in parallel. Mark `f` `#[inline(always)]`.
-    #[inline(always)]
-    pub fn for_each<A: Send, B: Send>(
+    /// `f(i, value of the operator at i, &mut a[i], &mut b[i])` for every real particle, in parallel.
+    pub fn for_each<O: Operator<D>, A: Send, B: Send>(
         &self,
+        operator: O,
         a: &mut [A],
         b: &mut [B],
-        f: impl Fn(Neighbourhood<D>, &mut A, &mut B) + Sync + Send,
+        f: impl Fn(usize, O::Value, &mut A, &mut B) + Sync,
     ) {
-        self.neighbours.for_each(
-            a,
-            b,
-            #[inline(always)]
-            |i, row, a, b| f(self.neighbourhood(i, row), a, b),
-        );
+        let Self { position, correction, .. } = self;
+        self.neighbours.for_each(a, b, Apply { operator, position, correction, f });
     }
 
-    /// `f(neighbourhood of i, &mut out[i])` for every real particle, in parallel. Mark `f` `#[inline(always)]`.
-    #[inline(always)]
-    pub fn for_each_one<A: Send>(&self, out: &mut [A], f: impl Fn(Neighbourhood<D>, &mut A) + Sync + Send) {
+    /// `f(i, value of the operator at i, &mut out[i])` for every real particle, in parallel.
+    pub fn for_each_one<O: Operator<D>, A: Send>(
+        &self,
+        operator: O,
+        out: &mut [A],
+        f: impl Fn(usize, O::Value, &mut A) + Sync,
+    ) {
         // A vector of () takes no memory.
         let mut nothing = vec![(); out.len()];
-        self.for_each(
-            out,
-            &mut nothing,
-            #[inline(always)]
-            |near, out, ()| f(near, out),
-        );
+        self.for_each(operator, out, &mut nothing, |i, value, out, ()| f(i, value, out));
     }
+}
 
-    /// The neighbourhood of real particle `i`.
-    pub fn at(&self, i: usize) -> Neighbourhood<'_, D> {
-        self.neighbourhood(i, self.neighbours.row(i))
-    }
+/// An operator, and what is done with its value at each particle.
+struct Apply<'a, O, F, const D: usize> {
+    operator: O,
+    position: &'a [Vector<D>],
+    correction: &'a [Correction<D>],
+    f: F,
+}
 
+impl<O, F, A, B, const D: usize> Visit<A, B> for Apply<'_, O, F, D>
+where
+    O: Operator<D>,
+    F: Fn(usize, O::Value, &mut A, &mut B) + Sync,
+{
     #[inline(always)]
-    fn neighbourhood<'a>(&'a self, i: usize, row: Row<'a>) -> Neighbourhood<'a, D> {
-        Neighbourhood { i, row, position: &self.position, correction: &self.correction[i] }
+    fn visit<V: Lanes>(&self, cluster: Cluster, row: Row<'_>, a: &mut [A], b: &mut [B]) {
+        let near = Neighbourhood { cluster, row, position: self.position, correction: self.correction };
+        let values = self.operator.apply::<V>(near);
+        for (lane, ((value, a), b)) in values.into_iter().zip(a).zip(b).enumerate() {
+            (self.f)(cluster.first + lane, value, a, b);
+        }
+    }
+}
+
+/// V_i, and the slopes with the volume `nominal` in the place of V_j.
+struct Volumes<'a, K, const D: usize> {
+    kernel: Smoothing<K>,
+    position: &'a [Vector<D>],
+    nominal: f64,
+}
+
+impl<K: Kernel, const D: usize> VisitMut<f64> for Volumes<'_, K, D> {
+    #[inline(always)]
+    fn visit<V: Lanes>(&self, cluster: Cluster, entries: &mut [Entry], volume: &mut [f64]) {
+        let here: [V; D] = cluster.vectors(self.position);
+        let (nominal, smallest) = (V::splat(self.nominal), V::splat(f64::MIN_POSITIVE));
+        let mut sum = V::zero();
+        for entry in entries {
+            let r_ij = from(here, &self.position[entry.j()]);
+            let distance = (norm_squared(r_ij) + smallest).sqrt();
+            sum += self.kernel.value(distance);
+            entry.set_slopes(self.kernel.slope(distance) * nominal);
+        }
+        let sum = sum.store();
+        volume.iter_mut().zip(sum).for_each(|(volume, sum)| *volume = 1.0 / sum);
+    }
+}
+
+/// V_j into the slopes, and the correction tensor (17) from the slopes as stored.
+struct Corrections<'a, const D: usize> {
+    position: &'a [Vector<D>],
+    volume: &'a [f64],
+    nominal: f64,
+}
+
+impl<const D: usize> VisitMut<Correction<D>> for Corrections<'_, D> {
+    #[inline(always)]
+    fn visit<V: Lanes>(&self, cluster: Cluster, entries: &mut [Entry], correction: &mut [Correction<D>]) {
+        let here: [V; D] = cluster.vectors(self.position);
+        let inverse = 1.0 / self.nominal;
+        let mut alpha = [[V::zero(); D]; D];
+        for entry in entries {
+            let j = entry.j();
+            entry.set_slopes(entry.slopes::<V>() * V::splat(self.volume[j] * inverse));
+            let (slope, r_ij) = (entry.slopes::<V>(), from(here, &self.position[j]));
+            for k in 0..D {
+                add_product(&mut alpha[k], slope * r_ij[k], r_ij);
+            }
+        }
+        let alpha = matrices(alpha);
+        correction.iter_mut().zip(alpha).for_each(|(correction, alpha)| *correction = Correction::of(&-alpha));
     }
 }
 

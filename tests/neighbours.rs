@@ -1,20 +1,25 @@
 //! The grid search against brute force, periodic sides and slip walls included.
 
 use alsph::frame::Frame;
-use alsph::neighbours::brute_force_neighbours;
+use alsph::neighbours::{Entry, brute_force_neighbours};
 use alsph::settings::Settings;
 use alsph::{ParticleKind, Particles, Vector};
 use proptest::prelude::*;
 
 mod common;
 
-/// Every real particle's neighbours, sorted.
-fn listed<const D: usize>(frame: &Frame<D>, particles: &Particles<D>) -> Vec<Vec<u32>> {
+/// Every real particle's neighbours closer than `radius`, sorted. What else the rows hold must not count.
+fn listed<const D: usize>(frame: &Frame<D>, particles: &Particles<D>, radius: f64) -> Vec<Vec<u32>> {
     (0..particles.real)
         .map(|i| {
-            let mut row: Vec<u32> = frame.stencil.neighbours.row(i).all().iter().map(|pair| pair.j() as u32).collect();
-            row.sort_unstable();
-            row
+            let (row, lane) = frame.stencil.neighbours.row(i);
+            let far = |j: usize| (particles.position[i] - particles.position[j]).norm_squared() >= radius * radius;
+            let (beyond, mut near): (Vec<&Entry>, Vec<&Entry>) = row.all().iter().partition(|entry| far(entry.j()));
+            assert!(beyond.iter().all(|entry| entry.slope(lane) == 0.0));
+            near.retain(|entry| entry.j() != i);
+            let mut near: Vec<u32> = near.iter().map(|entry| entry.j() as u32).collect();
+            near.sort_unstable();
+            near
         })
         .collect()
 }
@@ -57,15 +62,34 @@ fn check<const D: usize>(points: Vec<Vector<D>>, boundary: &str, solid: u64) -> 
     }
     let mut frame = Frame::default();
     frame.search(&settings, &mut particles, 0.0, true);
-    let expected = brute_force_neighbours(&particles.position, particles.real, settings.support_radius());
-    prop_assert_eq!(listed(&frame, &particles), expected);
-    let counts: Vec<usize> = listed(&frame, &particles).iter().map(Vec::len).collect();
+    let radius = settings.support_radius();
+    let expected = brute_force_neighbours(&particles.position, particles.real, radius);
+    prop_assert_eq!(listed(&frame, &particles, radius), expected);
+    let counts: Vec<usize> = listed(&frame, &particles, radius).iter().map(Vec::len).collect();
     prop_assert_eq!(counts, counts_by_images(&settings, &particles));
     for i in 0..particles.real {
-        let row = frame.stencil.neighbours.row(i);
-        prop_assert!(row.flowing().iter().all(|pair| particles.kind[pair.j()] != ParticleKind::Solid));
-        prop_assert!(row.solid().iter().all(|pair| particles.kind[pair.j()] == ParticleKind::Solid));
+        let (row, _) = frame.stencil.neighbours.row(i);
+        prop_assert!(row.flowing().iter().all(|entry| particles.kind[entry.j()] != ParticleKind::Solid));
+        prop_assert!(row.solid().iter().all(|entry| particles.kind[entry.j()] == ParticleKind::Solid));
     }
+    Ok(())
+}
+
+/// Particles that move within the step by less than half the skin need no new search, those that move farther get one.
+fn check_skin<const D: usize>(points: Vec<Vector<D>>, skin: f64, distance: f64) -> Result<(), TestCaseError> {
+    let settings = common::settings::<D>(0.1, "none");
+    let mut particles = common::particles(points);
+    let mut frame = Frame::default();
+    frame.search(&settings, &mut particles, skin, true);
+    for (i, position) in particles.position.iter_mut().enumerate() {
+        let angle = i as f64;
+        position[0] += distance * angle.cos();
+        position[1] += distance * angle.sin();
+    }
+    frame.update(&settings, &particles);
+    let radius = settings.support_radius();
+    let expected = brute_force_neighbours(&particles.position, particles.real, radius);
+    prop_assert_eq!(listed(&frame, &particles, radius), expected);
     Ok(())
 }
 
@@ -86,6 +110,11 @@ proptest! {
     fn search_in_3d_finds_what_brute_force_finds(points in points::<3>(200), boundary in common::boundary(), solid in 0u64..3) {
         check(points, boundary, solid)?;
     }
+
+    #[test]
+    fn moved_particles_keep_all_their_neighbours(points in points::<2>(400), skin in 0.0..0.1f64, distance in 0.0..0.1f64) {
+        check_skin(points, skin, distance)?;
+    }
 }
 
 #[test]
@@ -96,6 +125,6 @@ fn far_strays_cost_no_memory() {
     let mut particles = common::particles(points);
     let mut frame = Frame::default();
     frame.search(&settings, &mut particles, 0.0, true);
-    let expected = brute_force_neighbours(&particles.position, particles.real, settings.support_radius());
-    assert_eq!(listed(&frame, &particles), expected);
+    let radius = settings.support_radius();
+    assert_eq!(listed(&frame, &particles, radius), brute_force_neighbours(&particles.position, particles.real, radius));
 }

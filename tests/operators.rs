@@ -1,7 +1,9 @@
 //! The operators on disordered particles: exact for linear fields, consistent for quadratic ones, in 2-D and 3-D.
 
 use alsph::frame::Frame;
-use alsph::operators::Neighbourhood;
+use alsph::operators::{
+    Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, Operator, VelocityGradient, vector_laplacian,
+};
 use alsph::settings::Settings;
 use alsph::{Particles, Vector};
 use approx::assert_relative_eq;
@@ -23,8 +25,14 @@ impl<const D: usize> Set<D> {
         Self { particles, frame }
     }
 
-    fn near(&self, i: usize) -> Neighbourhood<'_, D> {
-        self.frame.stencil.at(i)
+    /// The operator's value at every real particle.
+    fn apply<O: Operator<D>>(&self, operator: O) -> Vec<O::Value>
+    where
+        O::Value: Clone + Send,
+    {
+        let mut values = vec![None; self.particles.real];
+        self.frame.stencil.for_each_one(operator, &mut values, |_, value, out| *out = Some(value));
+        values.into_iter().flatten().collect()
     }
 
     fn field<T>(&self, f: impl Fn(&Vector<D>) -> T) -> Vec<T> {
@@ -45,16 +53,22 @@ fn linear_fields_are_exact<const D: usize>(side: usize, disorder: f64, slope: [f
     let velocity = set.field(|x| gradient * x + Vector::repeat(offset));
     let scalar: Vec<f64> = velocity.iter().map(|u| u[0]).collect();
     let tolerance = 1e-11;
-    for i in 0..set.particles.real {
-        let near = set.near(i);
-        assert_relative_eq!(near.gradient(&scalar), gradient.row(0).transpose(), epsilon = tolerance);
-        assert_relative_eq!(near.velocity_gradient(&velocity), gradient, epsilon = tolerance);
-        assert_relative_eq!(near.divergence(&velocity), gradient.trace(), epsilon = tolerance);
-        let (_, divergence) = near.laplacian_and_divergence(&velocity, |s| velocity[s]);
-        assert_relative_eq!(divergence, gradient.trace(), epsilon = tolerance);
-        let both: Vec<[f64; 2]> = scalar.iter().map(|&f| [f, f]).collect();
-        let (first, _) = near.gradient_and_laplacian(&both);
-        assert_relative_eq!(first, gradient.row(0).transpose(), epsilon = tolerance);
+    let both: Vec<[f64; 2]> = scalar.iter().map(|&f| [f, f]).collect();
+    let row = gradient.row(0).transpose();
+    for value in set.apply(Gradient(&scalar)) {
+        assert_relative_eq!(value, row, epsilon = tolerance);
+    }
+    for (value, _) in set.apply(GradientAndLaplacian(&both)) {
+        assert_relative_eq!(value, row, epsilon = tolerance);
+    }
+    for value in set.apply(VelocityGradient(&velocity)) {
+        assert_relative_eq!(value, gradient, epsilon = tolerance);
+    }
+    for value in set.apply(Divergence(&velocity)) {
+        assert_relative_eq!(value, gradient.trace(), epsilon = tolerance);
+    }
+    for (_, value) in set.apply(LaplacianAndDivergence { velocity: &velocity, seen: |s, _| velocity[s] }) {
+        assert_relative_eq!(value, gradient.trace(), epsilon = tolerance);
     }
 }
 
@@ -75,25 +89,26 @@ fn derivatives_of_a_constant_are_exactly_zero() {
     let set = Set::<2>::new(12, 0.3, &common::settings::<2>(1.0 / 12.0, "none"));
     let scalar = set.field(|_| 0.1);
     let vector = set.field(|_| Vector::from([0.1, 1e5]));
-    for i in 0..set.particles.real {
-        assert_eq!(set.near(i).gradient(&scalar), Vector::<2>::zeros());
-        assert_eq!(set.near(i).laplacian(&scalar), 0.0);
-        assert_eq!(set.near(i).laplacian_and_divergence(&vector, |s| vector[s]), (Vector::<2>::zeros(), 0.0));
-    }
+    let both = set.field(|_| [0.1, 1e5]);
+    assert!(set.apply(Gradient(&scalar)).iter().all(|value| *value == Vector::<2>::zeros()));
+    assert!(set.apply(GradientAndLaplacian(&both)).iter().all(|value| *value == (Vector::<2>::zeros(), 0.0)));
+    let operator = LaplacianAndDivergence { velocity: &vector, seen: |s, _| vector[s] };
+    assert!(set.apply(operator).iter().all(|value| *value == (Vector::<2>::zeros(), 0.0)));
 }
 
 /// ∇² of x² + y² (+ z²), and of each component of the velocity (x² , xy): on a lattice to a part in a thousand.
 fn laplacian_of_quadratics<const D: usize>(side: usize) {
     let settings = common::settings::<D>(1.0 / side as f64, "none");
     let set = Set::<D>::new(side, 0.0, &settings);
-    let scalar = set.field(|x| x.norm_squared());
+    let scalar = set.field(|x| [0.0, x.norm_squared()]);
     let sheared = set.field(|x| Vector::<D>::from_fn(|k, _| if k == 0 { x[1] * x[1] } else { x[0] * x[1] }));
+    let scalars = set.apply(GradientAndLaplacian(&scalar));
+    let vectors = set.apply(LaplacianAndDivergence { velocity: &sheared, seen: |s, _| sheared[s] });
     let mut seen = 0;
     for i in set.interior(&settings) {
         seen += 1;
-        let laplacian = set.near(i).laplacian(&scalar);
-        assert_relative_eq!(laplacian, 2.0 * D as f64, max_relative = 3e-3);
-        let (vector, _) = set.near(i).laplacian_and_divergence(&sheared, |s| sheared[s]);
+        assert_relative_eq!(scalars[i].1, 2.0 * D as f64, max_relative = 3e-3);
+        let vector = vectors[i].0;
         assert_relative_eq!(vector[0], 2.0, max_relative = 3e-3);
         assert_relative_eq!(vector[1], 0.0, epsilon = 2e-3);
     }
@@ -113,11 +128,15 @@ fn printed_vector_laplacian_is_anisotropic_as_measured() {
     let set = Set::<2>::new(20, 0.0, &settings);
     let i = set.interior(&settings).next().expect("the box has an interior");
     let along = set.field(|x| Vector::from([x[1] * x[1], 0.0]));
-    assert_relative_eq!(set.near(i).vector_laplacian(&along, |s| along[s])[0], 1.89, epsilon = 0.01);
+    assert_relative_eq!(vector_laplacian(&set.frame.stencil, &along, i, |s| along[s])[0], 1.89, epsilon = 0.01);
     let normal = Vector::from([-1.0, 1.0]) / 2f64.sqrt();
     let tangent = Vector::from([1.0, 1.0]) / 2f64.sqrt();
     let oblique = set.field(|x| tangent * x.dot(&normal).powi(2));
-    assert_relative_eq!(set.near(i).vector_laplacian(&oblique, |s| oblique[s]).dot(&tangent), 2.11, epsilon = 0.01);
+    assert_relative_eq!(
+        vector_laplacian(&set.frame.stencil, &oblique, i, |s| oblique[s]).dot(&tangent),
+        2.11,
+        epsilon = 0.01
+    );
 }
 
 #[test]

@@ -127,7 +127,7 @@ fn refill<const D: usize>(
     let mut position = particles.position[i];
     position[side.axis] -= side.inward * settings.buffer_length();
     let mut nearest = (f64::INFINITY, particles.pressure[i]);
-    grid.for_each_run(&position, |run| {
+    grid.for_each_run(&[position], |run| {
         for &j in run.indices {
             let j = j as usize;
             if j < particles.real && particles.kind[j] == ParticleKind::Inlet {

@@ -1,9 +1,9 @@
 //! Solid walls: what velocity and pressure a solid particle shows to the fluid. (20)
 
 use crate::kernel::{Kernel, Smoothing};
-use crate::operators::Neighbourhood;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{Settings, WallVelocity};
+use crate::stencil::Stencil;
 use crate::with_kernel;
 
 /// Largest ratio of the distances of solid and fluid from the surface: β_max − 1 of Morris, Fox and Zhu (1997).
@@ -41,27 +41,29 @@ impl<const D: usize> Walls<D> {
     }
 }
 
-/// Σ W field_j / Σ W over the flowing neighbours of a particle, of the value that `at` gives for j and r_ij. None without
+/// Σ W field_j / Σ W over the flowing neighbours of particle `i`, of the value that `at` gives for j and r_ij. None without
 /// neighbours.
 pub fn shepard<const D: usize, const N: usize>(
     settings: &Settings,
-    near: Neighbourhood<D>,
+    stencil: &Stencil<D>,
+    i: usize,
     at: impl Fn(usize, Vector<D>) -> [f64; N],
 ) -> Option<[f64; N]> {
-    with_kernel!(settings.kernel, K => average(Smoothing::<K>::new(settings.smoothing_length(), D), near, at))
+    with_kernel!(settings.kernel, K => average(Smoothing::<K>::new(settings.smoothing_length(), D), stencil, i, at))
 }
 
 fn average<K: Kernel, const D: usize, const N: usize>(
     kernel: Smoothing<K>,
-    near: Neighbourhood<D>,
+    stencil: &Stencil<D>,
+    i: usize,
     at: impl Fn(usize, Vector<D>) -> [f64; N],
 ) -> Option<[f64; N]> {
     let mut total = 0.0;
     let mut sum = [0.0; N];
-    for pair in near.row.flowing() {
-        let r_ij = near.position[near.i] - near.position[pair.j()];
+    for entry in stencil.neighbours.row(i).0.flowing() {
+        let r_ij = stencil.position[i] - stencil.position[entry.j()];
         let weight = kernel.value(r_ij.norm());
-        let value = at(pair.j(), r_ij);
+        let value = at(entry.j(), r_ij);
         total += weight;
         for k in 0..N {
             sum[k] += weight * value[k];

@@ -1,7 +1,6 @@
 //! Cells at least half as wide as the search radius; points are listed by cell with a counting sort.
 
 use crate::particles::Vector;
-use std::ops::Range;
 
 /// Cells that the search radius reaches to either side: narrow cells fit the sphere closer than wide ones.
 const REACH: usize = 2;
@@ -101,28 +100,59 @@ impl<const D: usize> Grid<D> {
         &self.items
     }
 
-    /// Call `visit` with each run of points that may lie within the search radius of `point`, in a fixed order.
+    /// Call `visit` with each run of points that may lie within the search radius of one of `points`, in a fixed order and
+    /// no run twice.
     #[inline(always)]
-    pub fn for_each_run(&self, point: &Vector<D>, mut visit: impl FnMut(Run<D>)) {
-        let center = self.cell(point);
-        let range = |axis: usize| center[axis].saturating_sub(REACH)..(center[axis] + REACH + 1).min(self.cells[axis]);
-        let first = range(0);
-        let mut visit_row = |row: usize| {
-            let run = self.run(row * self.cells[0], &first);
-            visit(Run {
-                indices: &self.items[run.clone()],
-                coordinates: self.coordinates.each_ref().map(|x| &x[run.clone()]),
-            });
+    pub fn for_each_run<const N: usize>(&self, points: &[Vector<D>; N], mut visit: impl FnMut(Run<D>)) {
+        let mut boxes: [[[usize; 2]; D]; N] = points.each_ref().map(|point| self.around(point));
+        boxes.sort_unstable_by_key(|cells| cells[0]);
+        let rows = |axis: usize| {
+            let starts = boxes.iter().map(|cells| cells[axis][0]);
+            starts.min().unwrap_or(0)..boxes.iter().map(|cells| cells[axis][1]).max().unwrap_or(0)
         };
-        match D {
-            2 => range(1).for_each(&mut visit_row),
-            _ => range(2).for_each(|k| range(1).for_each(|j| visit_row(k * self.cells[1] + j))),
+        let mut visit_row = |row: [usize; D]| {
+            // In the first direction the boxes that meet this row overlap, or leave gaps that need no visit.
+            let mut run: Option<[usize; 2]> = None;
+            for cells in &boxes {
+                if (1..D).any(|axis| row[axis] < cells[axis][0] || row[axis] >= cells[axis][1]) {
+                    continue;
+                }
+                let [start, end] = cells[0];
+                run = match run {
+                    Some([first, last]) if start <= last => Some([first, last.max(end)]),
+                    other => {
+                        other.into_iter().for_each(|run| visit(self.run(row, run)));
+                        Some([start, end])
+                    }
+                };
+            }
+            run.into_iter().for_each(|run| visit(self.run(row, run)));
+        };
+        let mut row = [0; D];
+        for k in if D == 3 { rows(2) } else { 0..1 } {
+            for j in rows(1) {
+                row[1] = j;
+                if D == 3 {
+                    row[2] = k;
+                }
+                visit_row(row);
+            }
         }
     }
 
+    /// First cell and end, in each direction, of those that the search radius reaches around `point`.
     #[inline(always)]
-    fn run(&self, row_start: usize, cells: &Range<usize>) -> Range<usize> {
-        self.starts[row_start + cells.start] as usize..self.starts[row_start + cells.end] as usize
+    fn around(&self, point: &Vector<D>) -> [[usize; 2]; D] {
+        let center = self.cell(point);
+        std::array::from_fn(|axis| [center[axis].saturating_sub(REACH), (center[axis] + REACH + 1).min(self.cells[axis])])
+    }
+
+    /// The points in cells `first` to `end` of a row.
+    #[inline(always)]
+    fn run(&self, row: [usize; D], [first, end]: [usize; 2]) -> Run<'_, D> {
+        let start = self.flat(row);
+        let range = self.starts[start + first] as usize..self.starts[start + end] as usize;
+        Run { indices: &self.items[range.clone()], coordinates: self.coordinates.each_ref().map(|x| &x[range.clone()]) }
     }
 
     #[inline(always)]

@@ -1,9 +1,12 @@
-//! The flat neighbour list: one row of pairs a real particle, stored chunk by chunk.
+//! The neighbour list: four particles that follow each other share one row, because they have most neighbours in common and a
+//! loop over the row then computes all four at once. Rows are stored chunk by chunk.
 
 use super::Grid;
-use crate::parallel::{CHUNK, vectorised};
-use crate::particles::{ParticleKind, Particles};
+use crate::lanes::{LANES, Lanes, Task, from, norm_squared, run};
+use crate::parallel::CHUNK;
+use crate::particles::{ParticleKind, Particles, Vector};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Type of the one number stored a pair.
 #[cfg(not(feature = "double-slopes"))]
@@ -11,55 +14,122 @@ pub type Slope = f32;
 #[cfg(feature = "double-slopes")]
 pub type Slope = f64;
 
-/// A neighbour j of the row's particle i.
+/// A neighbour j of one or more particles i of a cluster.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
-pub struct Pair {
-    /// V_j (dW/dr)/r, so that V_j ∇_i W_ij = slope · r_ij. Never positive.
-    pub slope: Slope,
+pub struct Entry {
+    /// V_j (dW/dr)/r for each i, so that V_j ∇_i W_ij = slope · r_ij. Never positive, and zero beyond the support.
+    slopes: [Slope; LANES],
     index: u32,
 }
 
-impl Pair {
+impl Entry {
     #[inline(always)]
     pub fn j(&self) -> usize {
         self.index as usize
     }
 
     #[inline(always)]
-    pub fn slope(&self) -> f64 {
-        f64::from(self.slope)
+    pub fn slope(&self, lane: usize) -> f64 {
+        f64::from(self.slopes[lane])
+    }
+
+    #[cfg(not(feature = "double-slopes"))]
+    #[inline(always)]
+    pub fn slopes<V: Lanes>(&self) -> V {
+        V::load_single(&self.slopes)
+    }
+
+    #[cfg(not(feature = "double-slopes"))]
+    #[inline(always)]
+    pub fn set_slopes<V: Lanes>(&mut self, slopes: V) {
+        self.slopes = slopes.store_single();
+    }
+
+    #[cfg(feature = "double-slopes")]
+    #[inline(always)]
+    pub fn slopes<V: Lanes>(&self) -> V {
+        V::load(&self.slopes)
+    }
+
+    #[cfg(feature = "double-slopes")]
+    #[inline(always)]
+    pub fn set_slopes<V: Lanes>(&mut self, slopes: V) {
+        self.slopes = slopes.store();
     }
 }
 
-/// The neighbours of one particle: those that flow, then the solid ones.
+/// The neighbours of a cluster, itself included: those that flow, then the solid ones.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a> {
-    pairs: &'a [Pair],
+    entries: &'a [Entry],
     flowing: usize,
 }
 
 impl<'a> Row<'a> {
     #[inline(always)]
-    pub fn all(&self) -> &'a [Pair] {
-        self.pairs
+    pub fn all(&self) -> &'a [Entry] {
+        self.entries
     }
 
     /// Fluid and buffer neighbours.
     #[inline(always)]
-    pub fn flowing(&self) -> &'a [Pair] {
-        &self.pairs[..self.flowing]
+    pub fn flowing(&self) -> &'a [Entry] {
+        &self.entries[..self.flowing]
     }
 
     #[inline(always)]
-    pub fn solid(&self) -> &'a [Pair] {
-        &self.pairs[self.flowing..]
+    pub fn solid(&self) -> &'a [Entry] {
+        &self.entries[self.flowing..]
     }
+}
+
+/// Up to four particles that follow each other in the arrays.
+#[derive(Clone, Copy, Debug)]
+pub struct Cluster {
+    pub first: usize,
+    pub count: usize,
+}
+
+impl Cluster {
+    /// The particle of each lane. Surplus lanes repeat the last particle.
+    #[inline(always)]
+    pub fn particles(&self) -> [usize; LANES] {
+        std::array::from_fn(|lane| self.first + lane.min(self.count - 1))
+    }
+
+    /// `value` of the particle of each lane.
+    #[inline(always)]
+    pub fn lanes<V: Lanes>(&self, value: impl Fn(usize) -> f64) -> V {
+        V::load(&self.particles().map(value))
+    }
+
+    /// A vector field at the particle of each lane.
+    #[inline(always)]
+    pub fn vectors<V: Lanes, const D: usize>(&self, field: &[Vector<D>]) -> [V; D] {
+        let mut vectors = [V::zero(); D];
+        for axis in 0..D {
+            vectors[axis] = self.lanes(|i| field[i][axis]);
+        }
+        vectors
+    }
+}
+
+/// Work on one cluster after the other; `a` and `b` are the outputs of its particles.
+pub trait Visit<A, B>: Sync {
+    fn visit<V: Lanes>(&self, cluster: Cluster, row: Row<'_>, a: &mut [A], b: &mut [B]);
+}
+
+/// Work that changes the rows.
+pub trait VisitMut<A>: Sync {
+    fn visit<V: Lanes>(&self, cluster: Cluster, entries: &mut [Entry], a: &mut [A]);
 }
 
 #[derive(Debug, Default)]
 struct Chunk {
-    pairs: Vec<Pair>,
+    /// Particles of the chunk.
+    count: usize,
+    entries: Vec<Entry>,
     /// Start of each row and of its solid part, and the end.
     starts: Vec<[u32; 2]>,
     /// Neighbours of the row in the making.
@@ -68,73 +138,15 @@ struct Chunk {
 
 impl Chunk {
     #[inline(always)]
-    fn row(&self, k: usize) -> Row<'_> {
-        let [start, solid] = self.starts[k];
-        Row { pairs: &self.pairs[start as usize..self.starts[k + 1][0] as usize], flowing: (solid - start) as usize }
+    fn range(&self, row: usize) -> Range<usize> {
+        self.starts[row][0] as usize..self.starts[row + 1][0] as usize
     }
 
     #[inline(always)]
-    fn search<const D: usize>(
-        &mut self,
-        rows: std::ops::Range<usize>,
-        particles: &Particles<D>,
-        grid: &Grid<D>,
-        radius: f64,
-    ) {
-        let blank = |&index: &u32| Pair { slope: 0.0, index };
-        let solid = |j: &u32| particles.kind[*j as usize] == ParticleKind::Solid;
-        self.pairs.clear();
-        self.starts.clear();
-        for i in rows {
-            let start = self.pairs.len() as u32;
-            let near = find(particles, grid, radius, i, &mut self.near);
-            if near.iter().any(solid) {
-                self.pairs.extend(near.iter().filter(|j| !solid(j)).map(blank));
-                self.starts.push([start, self.pairs.len() as u32]);
-                self.pairs.extend(near.iter().filter(|j| solid(j)).map(blank));
-            } else {
-                self.pairs.extend(near.iter().map(blank));
-                self.starts.push([start, self.pairs.len() as u32]);
-            }
-        }
-        self.starts.push([self.pairs.len() as u32; 2]);
+    fn row(&self, row: usize) -> Row<'_> {
+        let [start, solid] = self.starts[row];
+        Row { entries: &self.entries[self.range(row)], flowing: (solid - start) as usize }
     }
-}
-
-/// The indices of all others within `radius` of particle `i`, collected at the front of `near`, which only ever grows.
-#[inline(always)]
-fn find<'a, const D: usize>(
-    particles: &Particles<D>,
-    grid: &Grid<D>,
-    radius: f64,
-    i: usize,
-    near: &'a mut Vec<u32>,
-) -> &'a [u32] {
-    const BATCH: usize = 32;
-    let point = particles.position[i];
-    let square = radius * radius;
-    let mut count = 0;
-    grid.for_each_run(&point, |run| {
-        let length = run.indices.len();
-        if near.len() < count + length {
-            near.resize(2 * (count + length), 0);
-        }
-        for start in (0..length).step_by(BATCH) {
-            let end = (start + BATCH).min(length);
-            let mut squares = [0.0; BATCH];
-            for axis in 0..D {
-                for (sum, x) in squares.iter_mut().zip(&run.coordinates[axis][start..end]) {
-                    *sum += (x - point[axis]) * (x - point[axis]);
-                }
-            }
-            // Every candidate is written, and the next one overwrites it unless it counts: a branch would be mispredicted.
-            for (&j, distance) in run.indices[start..end].iter().zip(squares) {
-                near[count] = j;
-                count += usize::from((distance < square) & (j as usize != i));
-            }
-        }
-    });
-    &near[..count]
 }
 
 #[derive(Debug, Default)]
@@ -143,67 +155,142 @@ pub struct NeighbourList {
 }
 
 impl NeighbourList {
-    /// List the neighbours within `radius` of every real particle. The slopes are left blank.
+    /// List for every cluster of real particles all within `radius` of one of them. The slopes are left blank.
     pub fn search<const D: usize>(&mut self, particles: &Particles<D>, grid: &Grid<D>, radius: f64) {
-        let rows = particles.real;
-        self.chunks.resize_with(rows.div_ceil(CHUNK), Chunk::default);
+        let real = particles.real;
+        self.chunks.resize_with(real.div_ceil(CHUNK), Chunk::default);
         self.chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
-            let rows = c * CHUNK..((c + 1) * CHUNK).min(rows);
-            vectorised(
-                #[inline(always)]
-                || chunk.search(rows, particles, grid, radius),
-            );
+            let start = c * CHUNK;
+            run(Search { chunk, start, count: CHUNK.min(real - start), particles, grid, radius });
         });
     }
 
-    /// `f(i, row, &mut a[i], &mut b[i])` for every row, in parallel. Mark `f` `#[inline(always)]`, see [`vectorised`].
-    pub fn for_each<A: Send, B: Send>(
-        &self,
-        a: &mut [A],
-        b: &mut [B],
-        f: impl Fn(usize, Row<'_>, &mut A, &mut B) + Sync + Send,
-    ) {
+    /// Visit every cluster in parallel.
+    pub fn for_each<A: Send, B: Send>(&self, a: &mut [A], b: &mut [B], visitor: impl Visit<A, B>) {
+        struct Pass<'a, A, B, W>(&'a Chunk, usize, &'a mut [A], &'a mut [B], &'a W);
+
+        impl<A, B, W: Visit<A, B>> Task for Pass<'_, A, B, W> {
+            #[inline(always)]
+            fn run<V: Lanes>(self) {
+                let Self(chunk, start, a, b, visitor) = self;
+                let outputs = a.chunks_mut(LANES).zip(b.chunks_mut(LANES));
+                for (row, (a, b)) in outputs.enumerate() {
+                    let cluster = Cluster { first: start + row * LANES, count: a.len() };
+                    visitor.visit::<V>(cluster, chunk.row(row), a, b);
+                }
+            }
+        }
+
         let outputs = a.par_chunks_mut(CHUNK).zip(b.par_chunks_mut(CHUNK));
         self.chunks.par_iter().zip(outputs).enumerate().for_each(|(c, (chunk, (a, b)))| {
-            vectorised(
-                #[inline(always)]
-                || {
-                    for (k, (a, b)) in a.iter_mut().zip(b).enumerate() {
-                        f(c * CHUNK + k, chunk.row(k), a, b);
-                    }
-                },
-            );
+            run(Pass(chunk, c * CHUNK, a, b, &visitor));
         });
     }
 
-    /// Fill the pairs of every row in parallel.
-    pub fn for_each_mut<A: Send, B: Send>(
-        &mut self,
-        a: &mut [A],
-        b: &mut [B],
-        f: impl Fn(usize, &mut [Pair], &mut A, &mut B) + Sync + Send,
-    ) {
-        let outputs = a.par_chunks_mut(CHUNK).zip(b.par_chunks_mut(CHUNK));
-        self.chunks.par_iter_mut().zip(outputs).enumerate().for_each(|(c, (chunk, (a, b)))| {
-            vectorised(
-                #[inline(always)]
-                || {
-                    for (k, (a, b)) in a.iter_mut().zip(b).enumerate() {
-                        let range = chunk.starts[k][0] as usize..chunk.starts[k + 1][0] as usize;
-                        f(c * CHUNK + k, &mut chunk.pairs[range], a, b);
-                    }
-                },
-            );
+    /// Visit every cluster in parallel and change its row.
+    pub fn for_each_mut<A: Send>(&mut self, out: &mut [A], visitor: impl VisitMut<A>) {
+        struct Pass<'a, A, W>(&'a mut Chunk, usize, &'a mut [A], &'a W);
+
+        impl<A, W: VisitMut<A>> Task for Pass<'_, A, W> {
+            #[inline(always)]
+            fn run<V: Lanes>(self) {
+                let Self(chunk, start, out, visitor) = self;
+                for (row, out) in out.chunks_mut(LANES).enumerate() {
+                    let cluster = Cluster { first: start + row * LANES, count: out.len() };
+                    let range = chunk.range(row);
+                    visitor.visit::<V>(cluster, &mut chunk.entries[range], out);
+                }
+            }
+        }
+
+        let outputs = out.par_chunks_mut(CHUNK);
+        self.chunks.par_iter_mut().zip(outputs).enumerate().for_each(|(c, (chunk, out))| {
+            run(Pass(chunk, c * CHUNK, out, &visitor));
         });
     }
 
-    /// The row of particle `i`.
-    pub fn row(&self, i: usize) -> Row<'_> {
-        self.chunks[i / CHUNK].row(i % CHUNK)
+    /// The row of the cluster of particle `i`, and its lane there.
+    pub fn row(&self, i: usize) -> (Row<'_>, usize) {
+        (self.chunks[i / CHUNK].row(i % CHUNK / LANES), i % LANES)
     }
 
-    /// Directed pairs in the list.
-    pub fn pair_count(&self) -> usize {
-        self.chunks.iter().map(|chunk| chunk.pairs.len()).sum()
+    /// Directed pairs closer than `radius`.
+    pub fn pair_count<const D: usize>(&self, position: &[Vector<D>], radius: f64) -> usize {
+        let near = |i: usize, j: usize| i != j && (position[i] - position[j]).norm_squared() < radius * radius;
+        let real = self.chunks.iter().map(|chunk| chunk.count).sum();
+        (0..real).map(|i| self.row(i).0.all().iter().filter(|entry| near(i, entry.j())).count()).sum()
     }
+
+    /// Entries in the list, each for up to four pairs.
+    pub fn entry_count(&self) -> usize {
+        self.chunks.iter().map(|chunk| chunk.entries.len()).sum()
+    }
+}
+
+/// The search of one chunk.
+struct Search<'a, const D: usize> {
+    chunk: &'a mut Chunk,
+    start: usize,
+    count: usize,
+    particles: &'a Particles<D>,
+    grid: &'a Grid<D>,
+    radius: f64,
+}
+
+impl<const D: usize> Task for Search<'_, D> {
+    #[inline(always)]
+    fn run<V: Lanes>(self) {
+        let Chunk { count, entries, starts, near } = self.chunk;
+        *count = self.count;
+        let blank = |&index: &u32| Entry { slopes: [0.0; LANES], index };
+        let solid = |j: &u32| self.particles.kind[*j as usize] == ParticleKind::Solid;
+        entries.clear();
+        starts.clear();
+        for offset in (0..self.count).step_by(LANES) {
+            let cluster = Cluster { first: self.start + offset, count: LANES.min(self.count - offset) };
+            let start = entries.len() as u32;
+            let near = find::<V, D>(cluster, &self.particles.position, self.grid, self.radius, near);
+            if near.iter().any(solid) {
+                entries.extend(near.iter().filter(|j| !solid(j)).map(blank));
+                starts.push([start, entries.len() as u32]);
+                entries.extend(near.iter().filter(|j| solid(j)).map(blank));
+            } else {
+                entries.extend(near.iter().map(blank));
+                starts.push([start, entries.len() as u32]);
+            }
+        }
+        starts.push([entries.len() as u32; 2]);
+    }
+}
+
+/// The indices of all within `radius` of a particle of the cluster, collected at the front of `near`, which only ever grows.
+#[inline(always)]
+fn find<'a, V: Lanes, const D: usize>(
+    cluster: Cluster,
+    position: &[Vector<D>],
+    grid: &Grid<D>,
+    radius: f64,
+    near: &'a mut Vec<u32>,
+) -> &'a [u32] {
+    let here: [V; D] = cluster.vectors(position);
+    let limit = V::splat(radius * radius);
+    let mut count = 0;
+    grid.for_each_run(
+        &cluster.particles().map(|i| position[i]),
+        #[inline(always)]
+        |run| {
+            let length = run.indices.len();
+            if near.len() < count + length {
+                near.resize(2 * (count + length), 0);
+            }
+            let coordinates = run.coordinates.map(|x| &x[..length]);
+            for (k, &j) in run.indices.iter().enumerate() {
+                let r_ij = from(here, &Vector::from_fn(|axis, _| coordinates[axis][k]));
+                // Every candidate is written, and the next one overwrites it unless it counts: a branch would be mispredicted.
+                near[count] = j;
+                count += usize::from(norm_squared(r_ij).any_below(limit));
+            }
+        },
+    );
+    &near[..count]
 }

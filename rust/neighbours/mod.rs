@@ -1,4 +1,4 @@
-//! Neighbour search: a counting-sort cell grid and a flat list of rows.
+//! Neighbour search: a counting-sort cell grid and a flat list of rows, one for four particles.
 
 mod brute_force;
 mod grid;
@@ -6,4 +6,4 @@ mod list;
 
 pub use brute_force::brute_force_neighbours;
 pub use grid::Grid;
-pub use list::{NeighbourList, Pair, Row, Slope};
+pub use list::{Cluster, Entry, NeighbourList, Row, Slope, Visit, VisitMut};

@@ -2,6 +2,7 @@
 
 use crate::boundary::{Walls, shepard};
 use crate::frame::Frame;
+use crate::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, vector_laplacian};
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{DerivativeFrame, Settings, VelocityLaplacian, WallPressure, WallVelocity};
@@ -94,19 +95,18 @@ impl<const D: usize> Alsph<D> {
         extrapolate_wall_velocity(step.settings, particles, frame, walls);
         let real = particles.real;
         let (velocity, pressure) = (&particles.velocity, &particles.pressure);
-        let vector_form = step.settings.velocity_laplacian == VelocityLaplacian::Vector;
         let walls = &*walls;
+        let seen = |s, i| walls.seen_by(particles, s, i);
         frame.stencil.for_each(
+            LaplacianAndDivergence { velocity, seen },
             &mut self.divergence_pressure[..real],
             &mut self.velocity_laplacian,
-            #[inline(always)]
-            |near, [divergence, p], laplacian| {
-                let solid = |s| walls.seen_by(particles, s, near.i);
-                (*laplacian, *divergence) = near.laplacian_and_divergence(velocity, solid);
-                if vector_form {
-                    *laplacian = near.vector_laplacian(velocity, solid);
-                }
-                *p = pressure[near.i];
+            |i, (component_form, divergence), out, laplacian| {
+                *out = [divergence, pressure[i]];
+                *laplacian = match step.settings.velocity_laplacian {
+                    VelocityLaplacian::Scalar => component_form,
+                    VelocityLaplacian::Vector => vector_laplacian(&frame.stencil, velocity, i, |s| seen(s, i)),
+                };
             },
         );
         frame.images.scalars(&mut self.divergence_pressure);
@@ -118,15 +118,12 @@ impl<const D: usize> Alsph<D> {
         let gravity = Vector::<D>::from_column_slice(&step.settings.body_force);
         let (dt, viscosity) = (step.time_step, step.settings.kinematic_viscosity);
         let paper_walls = step.settings.wall_pressure == WallPressure::Paper;
-        let fields = &self.divergence_pressure;
         let (initial, laplacian) = (&self.velocity_initial, &self.velocity_laplacian);
         frame.stencil.for_each(
+            GradientAndLaplacian(&self.divergence_pressure),
             &mut self.velocity_star[..real],
             &mut self.pressure_laplacian,
-            #[inline(always)]
-            |near, star, pressure_laplacian| {
-                let i = near.i;
-                let (penalty, p) = near.gradient_and_laplacian(fields);
+            |i, (penalty, p), star, pressure_laplacian| {
                 let still = match particles.kind[i] {
                     ParticleKind::Outlet => true,
                     ParticleKind::Solid => !paper_walls,
@@ -150,24 +147,18 @@ impl<const D: usize> Alsph<D> {
         let Step { settings, time_step: dt, penalty } = step;
         let paper_walls = settings.wall_pressure == WallPressure::Paper;
         let (star, initial, laplacian) = (&self.velocity_star, &self.velocity_initial, &self.pressure_laplacian);
-        frame.stencil.for_each_one(
-            &mut pressure[..*real],
-            #[inline(always)]
-            |near, p| {
-                let i = near.i;
-                let solid = kind[i] == ParticleKind::Solid;
-                if kind[i] == ParticleKind::Outlet {
-                    *p = 0.0;
-                } else if !solid || paper_walls {
-                    let divergence = near.divergence(star);
-                    *p -= penalty * (settings.density * divergence - dt * laplacian[i]);
-                }
-                if solid && paper_walls {
-                    // ∂p/∂n r_s with the pseudo-acceleration Δu/Δt and, from (12), the pseudo-displacement ½ Δu Δt.
-                    *p += 0.5 * settings.density * (star[i] - initial[i]).dot(&normal[i]).powi(2);
-                }
-            },
-        );
+        frame.stencil.for_each_one(Divergence(star), &mut pressure[..*real], |i, divergence, p| {
+            let solid = kind[i] == ParticleKind::Solid;
+            if kind[i] == ParticleKind::Outlet {
+                *p = 0.0;
+            } else if !solid || paper_walls {
+                *p -= penalty * (settings.density * divergence - dt * laplacian[i]);
+            }
+            if solid && paper_walls {
+                // ∂p/∂n r_s with the pseudo-acceleration Δu/Δt and, from (12), the pseudo-displacement ½ Δu Δt.
+                *p += 0.5 * settings.density * (star[i] - initial[i]).dot(&normal[i]).powi(2);
+            }
+        });
         frame.images.scalars(&mut particles.pressure);
         if !paper_walls {
             extrapolate_wall_pressure(settings, particles, frame);
@@ -180,15 +171,11 @@ impl<const D: usize> Alsph<D> {
         let Particles { real, kind, pressure, velocity, .. } = particles;
         let (kind, pressure, star) = (&*kind, &*pressure, &self.velocity_star);
         let factor = step.time_step / step.settings.density;
-        frame.stencil.for_each_one(
-            &mut velocity[..*real],
-            #[inline(always)]
-            |near, u| {
-                if kind[near.i] == ParticleKind::Fluid {
-                    *u = star[near.i] - near.gradient(pressure) * factor;
-                }
-            },
-        );
+        frame.stencil.for_each_one(Gradient(pressure), &mut velocity[..*real], |i, gradient, u| {
+            if kind[i] == ParticleKind::Fluid {
+                *u = star[i] - gradient * factor;
+            }
+        });
         frame.images.vectors(&mut particles.velocity);
     }
 
@@ -232,17 +219,12 @@ fn extrapolate_wall_velocity<const D: usize>(
     }
     let Particles { real, kind, velocity, .. } = particles;
     walls.viscous_velocity.resize(particles.len(), Vector::zeros());
-    frame.stencil.for_each_one(
-        &mut walls.viscous_velocity[..*real],
-        #[inline(always)]
-        |near, seen| {
-            let i = near.i;
-            if kind[i] == ParticleKind::Solid {
-                let average = shepard(settings, near, |j, _| velocity[j].into());
-                *seen = average.map_or(velocity[i], |average| velocity[i] * 2.0 - Vector::from(average));
-            }
-        },
-    );
+    parallel::for_each(&mut walls.viscous_velocity[..*real], |i, seen| {
+        if kind[i] == ParticleKind::Solid {
+            let average = shepard(settings, &frame.stencil, i, |j, _| velocity[j].into());
+            *seen = average.map_or(velocity[i], |average| velocity[i] * 2.0 - Vector::from(average));
+        }
+    });
     frame.images.vectors(&mut walls.viscous_velocity);
 }
 
@@ -252,17 +234,12 @@ fn extrapolate_wall_pressure<const D: usize>(settings: &Settings, particles: &mu
     let gravity = Vector::<D>::from_column_slice(&settings.body_force);
     let Particles { real, kind, pressure, .. } = particles;
     let fluid = pressure.clone();
-    frame.stencil.for_each_one(
-        &mut pressure[..*real],
-        #[inline(always)]
-        |near, p| {
-            let i = near.i;
-            if kind[i] == ParticleKind::Solid {
-                let at = |j: usize, r_ij: Vector<D>| [fluid[j] + settings.density * gravity.dot(&r_ij)];
-                *p = shepard(settings, near, at).map_or(0.0, |[average]| average);
-            }
-        },
-    );
+    parallel::for_each(&mut pressure[..*real], |i, p| {
+        if kind[i] == ParticleKind::Solid {
+            let at = |j: usize, r_ij: Vector<D>| [fluid[j] + settings.density * gravity.dot(&r_ij)];
+            *p = shepard(settings, &frame.stencil, i, at).map_or(0.0, |[average]| average);
+        }
+    });
 }
 
 fn copy<T: Copy>(from: &[T], to: &mut Vec<T>) {

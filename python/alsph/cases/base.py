@@ -74,7 +74,7 @@ class Case(Parameters):
         description="velocity of solid particles in the viscous term: the body's own, or extrapolated for no-slip",
     )
     wall_pressure: Literal["paper", "adami"] = Field(
-        default="paper", description="pressure of solid particles: eqs. (10) and (20), or Shepard extrapolation"
+        default="adami", description="pressure of solid particles: eqs. (10) and (20), or Shepard extrapolation"
     )
 
     @classmethod

@@ -1,0 +1,333 @@
+//! Four numbers side by side, one for each particle of a cluster: what the loops over pairs compute with.
+//!
+//! [`run`] picks the vector instructions at run time, so that one build is fast on every machine. All versions round alike
+//! (no operation is fused or reordered), so the results are the same to the last bit.
+
+use crate::particles::{Matrix, Vector};
+use std::ops::{Add, AddAssign, Div, Mul, Sub};
+
+/// Particles a cluster.
+pub const LANES: usize = 4;
+
+/// A real number, or several side by side.
+pub trait Real:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + AddAssign
+{
+    fn splat(value: f64) -> Self;
+    fn sqrt(self) -> Self;
+    /// Its positive part: max(self, 0).
+    fn positive(self) -> Self;
+
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::splat(0.0)
+    }
+}
+
+/// Four numbers side by side.
+pub trait Lanes: Real {
+    fn load(values: &[f64; LANES]) -> Self;
+    fn load_single(values: &[f32; LANES]) -> Self;
+    fn store(self) -> [f64; LANES];
+    fn store_single(self) -> [f32; LANES];
+    /// 1 where `self` is below `limit`, else 0.
+    fn below(self, limit: Self) -> Self;
+    fn any_below(self, limit: Self) -> bool;
+}
+
+/// Work that is compiled for each kind of vector instructions. Mark `run`, and all that takes or gives `V`,
+/// `#[inline(always)]`: instructions are chosen where the work is inlined.
+pub trait Task {
+    fn run<V: Lanes>(self);
+}
+
+/// Run `task` with the vector instructions that this machine has.
+pub fn run(task: impl Task) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi1") && is_x86_feature_detected!("bmi2") {
+        // SAFETY: the machine has the features that `avx2::run` is compiled for.
+        return unsafe { avx2::run(task) };
+    }
+    task.run::<Portable>();
+}
+
+/// r_ij = r_i − r_j, of the particle i of each lane.
+#[inline(always)]
+pub fn from<V: Lanes, const D: usize>(here: [V; D], there: &Vector<D>) -> [V; D] {
+    let mut difference = here;
+    for axis in 0..D {
+        difference[axis] = here[axis] - V::splat(there[axis]);
+    }
+    difference
+}
+
+/// The square of a vector's length.
+#[inline(always)]
+pub fn norm_squared<V: Lanes, const D: usize>(vector: [V; D]) -> V {
+    let mut sum = vector[0] * vector[0];
+    for component in &vector[1..] {
+        sum += *component * *component;
+    }
+    sum
+}
+
+/// `sum += factor * vector`.
+#[inline(always)]
+pub fn add_product<V: Lanes, const D: usize>(sum: &mut [V; D], factor: V, vector: [V; D]) {
+    for axis in 0..D {
+        sum[axis] += factor * vector[axis];
+    }
+}
+
+/// The vector of each lane.
+#[inline(always)]
+pub fn vectors<V: Lanes, const D: usize>(components: [V; D]) -> [Vector<D>; LANES] {
+    let mut vectors = [Vector::zeros(); LANES];
+    for axis in 0..D {
+        let component = components[axis].store();
+        for lane in 0..LANES {
+            vectors[lane][axis] = component[lane];
+        }
+    }
+    vectors
+}
+
+/// The matrix of each lane.
+#[inline(always)]
+pub fn matrices<V: Lanes, const D: usize>(components: [[V; D]; D]) -> [Matrix<D>; LANES] {
+    let mut matrices = [Matrix::zeros(); LANES];
+    for k in 0..D {
+        for l in 0..D {
+            let component = components[k][l].store();
+            for lane in 0..LANES {
+                matrices[lane][(k, l)] = component[lane];
+            }
+        }
+    }
+    matrices
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.sqrt()
+    }
+
+    #[inline(always)]
+    fn positive(self) -> Self {
+        // f64::max would also look for NaN.
+        if self > 0.0 { self } else { 0.0 }
+    }
+}
+
+/// Lanes for any machine.
+#[derive(Clone, Copy)]
+pub struct Portable([f64; LANES]);
+
+impl Portable {
+    #[inline(always)]
+    fn with(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        Self(std::array::from_fn(|lane| f(self.0[lane], other.0[lane])))
+    }
+}
+
+impl Real for Portable {
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Self([value; LANES])
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f64::sqrt))
+    }
+
+    #[inline(always)]
+    fn positive(self) -> Self {
+        Self(self.0.map(Real::positive))
+    }
+}
+
+impl Lanes for Portable {
+    #[inline(always)]
+    fn load(values: &[f64; LANES]) -> Self {
+        Self(*values)
+    }
+
+    #[inline(always)]
+    fn load_single(values: &[f32; LANES]) -> Self {
+        Self(values.map(f64::from))
+    }
+
+    #[inline(always)]
+    fn store(self) -> [f64; LANES] {
+        self.0
+    }
+
+    #[inline(always)]
+    fn store_single(self) -> [f32; LANES] {
+        self.0.map(|value| value as f32)
+    }
+
+    #[inline(always)]
+    fn below(self, limit: Self) -> Self {
+        self.with(limit, |value, limit| f64::from(u8::from(value < limit)))
+    }
+
+    #[inline(always)]
+    fn any_below(self, limit: Self) -> bool {
+        self.0.iter().zip(limit.0).any(|(value, limit)| *value < limit)
+    }
+}
+
+/// Arithmetic of a type of lanes: `$operator` as `$combine(a, b)`.
+macro_rules! arithmetic {
+    ($Lanes:ty, $($Trait:ident $method:ident $combine:expr),*) => {
+        $(impl $Trait for $Lanes {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                $combine(self, other)
+            }
+        })*
+
+        impl AddAssign for $Lanes {
+            #[inline(always)]
+            fn add_assign(&mut self, other: Self) {
+                *self = *self + other;
+            }
+        }
+    };
+}
+
+arithmetic!(
+    Portable,
+    Add add |a: Self, b| a.with(b, |a, b| a + b),
+    Sub sub |a: Self, b| a.with(b, |a, b| a - b),
+    Mul mul |a: Self, b| a.with(b, |a, b| a * b),
+    Div div |a: Self, b| a.with(b, |a, b| a / b)
+);
+
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    use super::{LANES, Lanes, Real, Task};
+    use std::arch::x86_64::*;
+    use std::ops::{Add, AddAssign, Div, Mul, Sub};
+
+    /// Lanes in one AVX register. Made nowhere but below [`run`], hence the unsafe blocks of this module: the machine has the
+    /// instructions.
+    #[derive(Clone, Copy)]
+    pub struct Avx2(__m256d);
+
+    /// # Safety
+    /// The machine must have the features named.
+    #[target_feature(enable = "avx2,bmi1,bmi2")]
+    pub unsafe fn run(task: impl Task) {
+        task.run::<Avx2>();
+    }
+
+    impl Real for Avx2 {
+        #[inline(always)]
+        fn splat(value: f64) -> Self {
+            Self(unsafe { _mm256_set1_pd(value) })
+        }
+
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            Self(unsafe { _mm256_sqrt_pd(self.0) })
+        }
+
+        #[inline(always)]
+        fn positive(self) -> Self {
+            Self(unsafe { _mm256_max_pd(self.0, _mm256_setzero_pd()) })
+        }
+    }
+
+    impl Lanes for Avx2 {
+        #[inline(always)]
+        fn load(values: &[f64; LANES]) -> Self {
+            Self(unsafe { _mm256_loadu_pd(values.as_ptr()) })
+        }
+
+        #[inline(always)]
+        fn load_single(values: &[f32; LANES]) -> Self {
+            Self(unsafe { _mm256_cvtps_pd(_mm_loadu_ps(values.as_ptr())) })
+        }
+
+        #[inline(always)]
+        fn store(self) -> [f64; LANES] {
+            let mut values = [0.0; LANES];
+            unsafe { _mm256_storeu_pd(values.as_mut_ptr(), self.0) };
+            values
+        }
+
+        #[inline(always)]
+        fn store_single(self) -> [f32; LANES] {
+            let mut values = [0.0; LANES];
+            unsafe { _mm_storeu_ps(values.as_mut_ptr(), _mm256_cvtpd_ps(self.0)) };
+            values
+        }
+
+        #[inline(always)]
+        fn below(self, limit: Self) -> Self {
+            Self(unsafe { _mm256_and_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, limit.0), _mm256_set1_pd(1.0)) })
+        }
+
+        #[inline(always)]
+        fn any_below(self, limit: Self) -> bool {
+            unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, limit.0)) != 0 }
+        }
+    }
+
+    arithmetic!(
+        Avx2,
+        Add add |a: Self, b: Self| Self(unsafe { _mm256_add_pd(a.0, b.0) }),
+        Sub sub |a: Self, b: Self| Self(unsafe { _mm256_sub_pd(a.0, b.0) }),
+        Mul mul |a: Self, b: Self| Self(unsafe { _mm256_mul_pd(a.0, b.0) }),
+        Div div |a: Self, b: Self| Self(unsafe { _mm256_div_pd(a.0, b.0) })
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Every operation on two sets of lanes.
+    struct All<'a> {
+        a: [f64; LANES],
+        b: [f64; LANES],
+        out: &'a mut Vec<u64>,
+    }
+
+    impl Task for All<'_> {
+        #[inline(always)]
+        fn run<V: Lanes>(self) {
+            let (a, b) = (V::load(&self.a), V::load(&self.b));
+            let mut sum = a;
+            sum += V::load_single(&b.store_single());
+            let results =
+                [a + b, a - b, a * b, a / b, a.positive(), a.positive().sqrt(), a.below(b), V::splat(self.a[0]), sum];
+            self.out.extend(results.iter().flat_map(|lanes| lanes.store()).map(f64::to_bits));
+            self.out.push(u64::from(a.any_below(b)));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_machines_lanes_agree_with_the_portable_ones(
+            a in proptest::array::uniform4(-1e3..1e3f64), b in proptest::array::uniform4(1e-3..1e3f64)
+        ) {
+            let (mut machine, mut portable) = (Vec::new(), Vec::new());
+            run(All { a, b, out: &mut machine });
+            All { a, b, out: &mut portable }.run::<Portable>();
+            prop_assert_eq!(machine, portable);
+        }
+    }
+}
