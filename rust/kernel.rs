@@ -1,6 +1,6 @@
 //! Smoothing kernels W(r, h), normalised in 1-D to 3-D.
 
-use crate::lanes::Real;
+use crate::lanes::{Lanes, Real};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -90,6 +90,9 @@ impl Kernel for WendlandC4 {
     }
 }
 
+/// Added to the squares of q, so that a particle is no exception among its neighbours.
+const SMALLEST: f64 = 1e-12;
+
 /// The choice of kernel as a setting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -152,6 +155,27 @@ impl<K: Kernel> Smoothing<K> {
     pub fn slope<R: Real>(&self, distance: R) -> R {
         let derivative = K::derivative(distance * R::splat(self.inverse_length));
         R::splat(self.factor * self.inverse_length) * derivative / distance
+    }
+
+    /// W(r) and its slope (dW/dr) / r for two sets of squared distances, in single precision (the slopes are stored in it).
+    #[cfg(not(feature = "double-slopes"))]
+    #[inline(always)]
+    pub fn evaluate<V: Lanes>(&self, squares: [V; 2]) -> ([V; 2], [V; 2]) {
+        let (scale, smallest) = (self.inverse_length * self.inverse_length, V::splat(SMALLEST));
+        let [first, second] = squares;
+        let q = V::join(first * V::splat(scale) + smallest, second * V::splat(scale) + smallest).sqrt();
+        let ([w0, w1], [s0, s1]) = (V::split(K::value(q)), V::split(K::derivative(q) / q));
+        let (value, slope) = (V::splat(self.factor), V::splat(self.factor * scale));
+        ([w0 * value, w1 * value], [s0 * slope, s1 * slope])
+    }
+
+    /// W(r) and its slope (dW/dr) / r for two sets of squared distances.
+    #[cfg(feature = "double-slopes")]
+    #[inline(always)]
+    pub fn evaluate<V: Lanes>(&self, squares: [V; 2]) -> ([V; 2], [V; 2]) {
+        let smallest = V::splat(SMALLEST / (self.inverse_length * self.inverse_length));
+        let [first, second] = [(squares[0] + smallest).sqrt(), (squares[1] + smallest).sqrt()];
+        ([self.value(first), self.value(second)], [self.slope(first), self.slope(second)])
     }
 }
 

@@ -26,6 +26,11 @@ pub trait Real:
 
 /// Four numbers side by side.
 pub trait Lanes: Real {
+    /// Two sets of lanes side by side in single precision, for what needs no more: it takes half the time.
+    type Singles: Real;
+
+    fn join(first: Self, second: Self) -> Self::Singles;
+    fn split(singles: Self::Singles) -> [Self; 2];
     fn load(values: &[f64; LANES]) -> Self;
     fn load_single(values: &[f32; LANES]) -> Self;
     fn store(self) -> [f64; LANES];
@@ -125,35 +130,87 @@ impl Real for f64 {
     }
 }
 
+/// Arithmetic of a type of lanes, from functions of two.
+macro_rules! arithmetic {
+    ($Lanes:ty, $($Trait:ident $method:ident $combine:expr),*) => {
+        $(impl $Trait for $Lanes {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                $combine(self, other)
+            }
+        })*
+
+        impl AddAssign for $Lanes {
+            #[inline(always)]
+            fn add_assign(&mut self, other: Self) {
+                *self = *self + other;
+            }
+        }
+    };
+}
+
 /// Lanes for any machine.
 #[derive(Clone, Copy)]
 pub struct Portable([f64; LANES]);
 
-impl Portable {
-    #[inline(always)]
-    fn with(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        Self(std::array::from_fn(|lane| f(self.0[lane], other.0[lane])))
-    }
+#[derive(Clone, Copy)]
+pub struct PortableSingles([f32; 2 * LANES]);
+
+/// A type of lanes as an array of numbers.
+macro_rules! portable {
+    ($Lanes:ident, $number:ty) => {
+        impl $Lanes {
+            #[inline(always)]
+            fn with(self, other: Self, f: impl Fn($number, $number) -> $number) -> Self {
+                Self(std::array::from_fn(|lane| f(self.0[lane], other.0[lane])))
+            }
+        }
+
+        impl Real for $Lanes {
+            #[inline(always)]
+            fn splat(value: f64) -> Self {
+                Self([value as $number; _])
+            }
+
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                Self(self.0.map(<$number>::sqrt))
+            }
+
+            #[inline(always)]
+            fn positive(self) -> Self {
+                Self(self.0.map(|value| if value > 0.0 { value } else { 0.0 }))
+            }
+        }
+
+        arithmetic!(
+            $Lanes,
+            Add add |a: Self, b| a.with(b, |a, b| a + b),
+            Sub sub |a: Self, b| a.with(b, |a, b| a - b),
+            Mul mul |a: Self, b| a.with(b, |a, b| a * b),
+            Div div |a: Self, b| a.with(b, |a, b| a / b)
+        );
+    };
 }
 
-impl Real for Portable {
-    #[inline(always)]
-    fn splat(value: f64) -> Self {
-        Self([value; LANES])
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(self.0.map(f64::sqrt))
-    }
-
-    #[inline(always)]
-    fn positive(self) -> Self {
-        Self(self.0.map(Real::positive))
-    }
-}
+portable!(Portable, f64);
+portable!(PortableSingles, f32);
 
 impl Lanes for Portable {
+    type Singles = PortableSingles;
+
+    #[inline(always)]
+    fn join(first: Self, second: Self) -> PortableSingles {
+        PortableSingles(std::array::from_fn(|lane| [first, second][lane / LANES].0[lane % LANES] as f32))
+    }
+
+    #[inline(always)]
+    fn split(singles: PortableSingles) -> [Self; 2] {
+        [0, LANES].map(|start| Self(std::array::from_fn(|lane| f64::from(singles.0[start + lane]))))
+    }
+
     #[inline(always)]
     fn load(values: &[f64; LANES]) -> Self {
         Self(*values)
@@ -185,35 +242,6 @@ impl Lanes for Portable {
     }
 }
 
-/// Arithmetic of a type of lanes: `$operator` as `$combine(a, b)`.
-macro_rules! arithmetic {
-    ($Lanes:ty, $($Trait:ident $method:ident $combine:expr),*) => {
-        $(impl $Trait for $Lanes {
-            type Output = Self;
-
-            #[inline(always)]
-            fn $method(self, other: Self) -> Self {
-                $combine(self, other)
-            }
-        })*
-
-        impl AddAssign for $Lanes {
-            #[inline(always)]
-            fn add_assign(&mut self, other: Self) {
-                *self = *self + other;
-            }
-        }
-    };
-}
-
-arithmetic!(
-    Portable,
-    Add add |a: Self, b| a.with(b, |a, b| a + b),
-    Sub sub |a: Self, b| a.with(b, |a, b| a - b),
-    Mul mul |a: Self, b| a.with(b, |a, b| a * b),
-    Div div |a: Self, b| a.with(b, |a, b| a / b)
-);
-
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
     use super::{LANES, Lanes, Real, Task};
@@ -224,6 +252,9 @@ mod avx2 {
     /// instructions.
     #[derive(Clone, Copy)]
     pub struct Avx2(__m256d);
+
+    #[derive(Clone, Copy)]
+    pub struct Singles(__m256);
 
     /// # Safety
     /// The machine must have the features named.
@@ -249,7 +280,37 @@ mod avx2 {
         }
     }
 
+    impl Real for Singles {
+        #[inline(always)]
+        fn splat(value: f64) -> Self {
+            Self(unsafe { _mm256_set1_ps(value as f32) })
+        }
+
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            Self(unsafe { _mm256_sqrt_ps(self.0) })
+        }
+
+        #[inline(always)]
+        fn positive(self) -> Self {
+            Self(unsafe { _mm256_max_ps(self.0, _mm256_setzero_ps()) })
+        }
+    }
+
     impl Lanes for Avx2 {
+        type Singles = Singles;
+
+        #[inline(always)]
+        fn join(first: Self, second: Self) -> Singles {
+            Singles(unsafe { _mm256_set_m128(_mm256_cvtpd_ps(second.0), _mm256_cvtpd_ps(first.0)) })
+        }
+
+        #[inline(always)]
+        fn split(singles: Singles) -> [Self; 2] {
+            let (first, second) = unsafe { (_mm256_castps256_ps128(singles.0), _mm256_extractf128_ps::<1>(singles.0)) };
+            unsafe { [Self(_mm256_cvtps_pd(first)), Self(_mm256_cvtps_pd(second))] }
+        }
+
         #[inline(always)]
         fn load(values: &[f64; LANES]) -> Self {
             Self(unsafe { _mm256_loadu_pd(values.as_ptr()) })
@@ -292,6 +353,14 @@ mod avx2 {
         Mul mul |a: Self, b: Self| Self(unsafe { _mm256_mul_pd(a.0, b.0) }),
         Div div |a: Self, b: Self| Self(unsafe { _mm256_div_pd(a.0, b.0) })
     );
+
+    arithmetic!(
+        Singles,
+        Add add |a: Self, b: Self| Self(unsafe { _mm256_add_ps(a.0, b.0) }),
+        Sub sub |a: Self, b: Self| Self(unsafe { _mm256_sub_ps(a.0, b.0) }),
+        Mul mul |a: Self, b: Self| Self(unsafe { _mm256_mul_ps(a.0, b.0) }),
+        Div div |a: Self, b: Self| Self(unsafe { _mm256_div_ps(a.0, b.0) })
+    );
 }
 
 #[cfg(test)]
@@ -312,8 +381,13 @@ mod tests {
             let (a, b) = (V::load(&self.a), V::load(&self.b));
             let mut sum = a;
             sum += V::load_single(&b.store_single());
-            let results =
-                [a + b, a - b, a * b, a / b, a.positive(), a.positive().sqrt(), a.below(b), V::splat(self.a[0]), sum];
+            let singles = V::join(a, b);
+            let [first, second] = V::split(singles * singles.positive().sqrt() + V::Singles::splat(0.1) - singles / singles);
+            let results = [
+                [a + b, a - b, a * b, a / b, a.positive(), a.positive().sqrt()],
+                [a.below(b), V::splat(self.a[0]), V::zero(), sum, first, second],
+            ]
+            .concat();
             self.out.extend(results.iter().flat_map(|lanes| lanes.store()).map(f64::to_bits));
             self.out.push(u64::from(a.any_below(b)));
         }

@@ -107,13 +107,16 @@ impl<K: Kernel, const D: usize> VisitMut<f64> for Volumes<'_, K, D> {
     #[inline(always)]
     fn visit<V: Lanes>(&self, cluster: Cluster, entries: &mut [Entry], volume: &mut [f64]) {
         let here: [V; D] = cluster.vectors(self.position);
-        let (nominal, smallest) = (V::splat(self.nominal), V::splat(f64::MIN_POSITIVE));
+        let nominal = V::splat(self.nominal);
+        let square = |entry: &Entry| norm_squared(from(here, &self.position[entry.j()]));
         let mut sum = V::zero();
-        for entry in entries {
-            let r_ij = from(here, &self.position[entry.j()]);
-            let distance = (norm_squared(r_ij) + smallest).sqrt();
-            sum += self.kernel.value(distance);
-            entry.set_slopes(self.kernel.slope(distance) * nominal);
+        for two in entries.chunks_mut(2) {
+            let squares = [square(&two[0]), square(&two[two.len() - 1])];
+            let (values, slopes) = self.kernel.evaluate(squares);
+            for ((entry, value), slope) in two.iter_mut().zip(values).zip(slopes) {
+                sum += value;
+                entry.set_slopes(slope * nominal);
+            }
         }
         let sum = sum.store();
         volume.iter_mut().zip(sum).for_each(|(volume, sum)| *volume = 1.0 / sum);
