@@ -2,9 +2,11 @@
 
 use crate::boundary::Images;
 use crate::neighbours::Grid;
+use crate::parallel::CHUNK;
 use crate::particles::{Particles, Vector};
-use crate::settings::Settings;
+use crate::settings::{DerivativeFrame, Settings};
 use crate::stencil::Stencil;
+use rayon::prelude::*;
 
 #[derive(Debug, Default)]
 pub struct Frame<const D: usize> {
@@ -20,7 +22,7 @@ impl<const D: usize> Frame<D> {
     /// Create the images of the particles, search neighbours and evaluate the stencil. The list stays complete until two
     /// particles have approached each other by `skin`. With `reorder` the particles are first put into cell order.
     pub fn search(&mut self, settings: &Settings, particles: &mut Particles<D>, skin: f64, reorder: bool) {
-        let radius = settings.support_radius() + skin;
+        let radius = search_radius(settings) + skin;
         self.skin = skin;
         particles.drop_images();
         if reorder {
@@ -42,22 +44,30 @@ impl<const D: usize> Frame<D> {
     }
 
     fn list_neighbours(&mut self, settings: &Settings, particles: &Particles<D>) {
-        let radius = settings.support_radius() + self.skin;
+        // A list for one set of positions only needs no skin.
+        let lasts = settings.derivative_frame == DerivativeFrame::Updated && !settings.search_every_iteration;
+        let radius = search_radius(settings) + if lasts { self.skin } else { 0.0 };
         self.grid.build(&particles.position, radius, settings.bounds());
         self.stencil.neighbours.search(particles, &self.grid, radius);
         self.searched.clear();
-        if self.skin > 0.0 {
+        if lasts {
             self.searched.extend_from_slice(&particles.position[..particles.real]);
         }
     }
 
     fn is_stale(&self, particles: &Particles<D>) -> bool {
         let limit = (0.5 * self.skin).powi(2);
-        self.searched.iter().zip(&particles.position).any(|(old, new)| (new - old).norm_squared() > limit)
+        let moved = self.searched.par_iter().zip(&particles.position).with_min_len(CHUNK);
+        moved.any(|(old, new)| (new - old).norm_squared() > limit)
     }
 
     fn evaluate(&mut self, settings: &Settings, particles: &Particles<D>) {
         let images = &self.images;
         self.stencil.evaluate(settings, particles, |volume| images.scalars(volume));
     }
+}
+
+/// A hair more than what counts as a neighbour, so that the list is complete whatever rounding does.
+fn search_radius(settings: &Settings) -> f64 {
+    settings.neighbour_distance() * (1.0 + 5e-7)
 }

@@ -18,6 +18,14 @@ pub trait Kernel: Copy + Send + Sync {
 #[derive(Clone, Copy)]
 pub struct QuinticSpline;
 
+impl QuinticSpline {
+    /// max(knot − q, 0).
+    #[inline(always)]
+    fn below<R: Real>(knot: f64, q: R) -> R {
+        (R::splat(knot) - q).positive()
+    }
+}
+
 impl Kernel for QuinticSpline {
     const SUPPORT: f64 = 3.0;
 
@@ -27,14 +35,14 @@ impl Kernel for QuinticSpline {
 
     #[inline(always)]
     fn value<R: Real>(q: R) -> R {
-        let [a, b, c] = [3.0, 2.0, 1.0].map(|knot| (R::splat(knot) - q).positive());
+        let (a, b, c) = (Self::below(3.0, q), Self::below(2.0, q), Self::below(1.0, q));
         let (a2, b2, c2) = (a * a, b * b, c * c);
         a * (a2 * a2) - R::splat(6.0) * b * (b2 * b2) + R::splat(15.0) * c * (c2 * c2)
     }
 
     #[inline(always)]
     fn derivative<R: Real>(q: R) -> R {
-        let [a, b, c] = [3.0, 2.0, 1.0].map(|knot| (R::splat(knot) - q).positive());
+        let (a, b, c) = (Self::below(3.0, q), Self::below(2.0, q), Self::below(1.0, q));
         let (a2, b2, c2) = (a * a, b * b, c * c);
         R::splat(-5.0) * (a2 * a2 - R::splat(6.0) * (b2 * b2) + R::splat(15.0) * (c2 * c2))
     }
@@ -90,8 +98,9 @@ impl Kernel for WendlandC4 {
     }
 }
 
-/// Added to the squares of q, so that a particle is no exception among its neighbours.
-const SMALLEST: f64 = 1e-12;
+/// Added to the squares of q, so that a particle is no exception among its neighbours, and below what single precision resolves
+/// at ordinary distances.
+const SMALLEST: f64 = 1e-8;
 
 /// The choice of kernel as a setting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -157,15 +166,21 @@ impl<K: Kernel> Smoothing<K> {
         R::splat(self.factor * self.inverse_length) * derivative / distance
     }
 
+    /// q = r/h for two sets of squared distances, in single precision. Zero distances give a small q instead.
+    #[inline(always)]
+    pub fn ratios<V: Lanes>(&self, squares: [V; 2]) -> V::Singles {
+        let (scale, smallest) = (V::splat(self.inverse_length * self.inverse_length), V::splat(SMALLEST));
+        V::join(squares[0] * scale + smallest, squares[1] * scale + smallest).sqrt()
+    }
+
     /// W(r) and its slope (dW/dr) / r for two sets of squared distances, in single precision (the slopes are stored in it).
     #[cfg(not(feature = "double-slopes"))]
     #[inline(always)]
     pub fn evaluate<V: Lanes>(&self, squares: [V; 2]) -> ([V; 2], [V; 2]) {
-        let (scale, smallest) = (self.inverse_length * self.inverse_length, V::splat(SMALLEST));
-        let [first, second] = squares;
-        let q = V::join(first * V::splat(scale) + smallest, second * V::splat(scale) + smallest).sqrt();
+        let q = self.ratios(squares);
         let ([w0, w1], [s0, s1]) = (V::split(K::value(q)), V::split(K::derivative(q) / q));
-        let (value, slope) = (V::splat(self.factor), V::splat(self.factor * scale));
+        let value = V::splat(self.factor);
+        let slope = V::splat(self.factor * self.inverse_length * self.inverse_length);
         ([w0 * value, w1 * value], [s0 * slope, s1 * slope])
     }
 

@@ -20,7 +20,7 @@ mod python;
 pub mod report;
 pub mod scheme;
 pub mod settings;
-mod shifting;
+pub mod shifting;
 mod simulation;
 pub mod stencil;
 

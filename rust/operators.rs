@@ -158,6 +158,7 @@ impl<const D: usize, F: Fn(usize, usize) -> Vector<D> + Sync> Operator<D> for La
 
 /// ∇²u + 2∇(∇·u) at particle `i`, which (16) gives as printed: the vector form with the correction tensor. Solid neighbours
 /// show the velocity that `solid` gives.
+#[inline(never)]
 pub fn vector_laplacian<const D: usize>(
     stencil: &Stencil<D>,
     velocity: &[Vector<D>],
@@ -178,7 +179,7 @@ pub fn vector_laplacian<const D: usize>(
 
 /// Σ slope (u_j − u_i) r_ijᵀ: ∇u before its correction.
 #[inline(always)]
-pub fn uncorrected_gradient<V: Lanes, const D: usize>(near: Neighbourhood<D>, field: &[Vector<D>]) -> [[V; D]; D] {
+fn uncorrected_gradient<V: Lanes, const D: usize>(near: Neighbourhood<D>, field: &[Vector<D>]) -> [[V; D]; D] {
     let here: [V; D] = near.cluster.vectors(field);
     let mut tensor = [[V::zero(); D]; D];
     near.for_each(
@@ -195,7 +196,7 @@ pub fn uncorrected_gradient<V: Lanes, const D: usize>(near: Neighbourhood<D>, fi
 
 /// α⁻¹ times a vector.
 #[inline(always)]
-pub fn corrected<V: Lanes, const D: usize>(near: Neighbourhood<D>, sum: [V; D]) -> [Vector<D>; LANES] {
+fn corrected<V: Lanes, const D: usize>(near: Neighbourhood<D>, sum: [V; D]) -> [Vector<D>; LANES] {
     let (sum, corrections) = (vectors(sum), near.corrections());
     std::array::from_fn(|lane| corrections[lane].inverse * sum[lane])
 }

@@ -163,6 +163,12 @@ impl Settings {
         self.kernel.support() * self.smoothing_length()
     }
 
+    /// Distance up to which others count as neighbours: the support radius and a hair, because on a lattice many lie at just the
+    /// support radius (4 Δx at h/Δx = 4/3), and rounding must not decide which of them count.
+    pub fn neighbour_distance(&self) -> f64 {
+        self.support_radius() * (1.0 + 5e-7)
+    }
+
     /// Length of the inlet and outlet buffers: 6h, in whole spacings.
     pub fn buffer_length(&self) -> f64 {
         (6.0 * self.smoothing_ratio - 1e-9).ceil() * self.particle_spacing

@@ -2,7 +2,7 @@
 
 use crate::frame::Frame;
 use crate::kernel::{Kernel, Smoothing};
-use crate::lanes::{LANES, Lanes, add_product, from, matrices, norm_squared, vectors};
+use crate::lanes::{LANES, Lanes, Real, add_product, from, matrices, norm_squared, vectors};
 use crate::operators::{Neighbourhood, Operator};
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
@@ -55,40 +55,22 @@ impl<K: Kernel, const D: usize> Operator<D> for Displacement<'_, K, D> {
 
     #[inline(always)]
     fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [Change<D>; LANES] {
-        let Particles { position, velocity, pressure, .. } = self.particles;
-        let here: [V; D] = near.cluster.vectors(position);
+        let Surroundings { asymmetry, relative, total, distances, count } = self.surroundings::<V>(near);
+        let (asymmetry, relative) = (vectors(asymmetry), vectors(relative));
+        let (total, distances, count) = (total.store(), distances.store(), count.store());
+        let Particles { velocity, pressure, .. } = self.particles;
         let (u, p): ([V; D], V) = (near.cluster.vectors(velocity), near.cluster.lanes(|i| pressure[i]));
-        let limit = self.settings.support_radius().powi(2);
-        let (limit, smallest) = (V::splat(limit), V::splat(1e-12 * limit));
-        // Σ r_ij / r_ij³, Σ W u_ij, Σ W, Σ r_ij and the number of neighbours of (18), and the gradients for (19).
-        let (mut asymmetry, mut relative) = ([V::zero(); D], [V::zero(); D]);
-        let (mut total, mut distances, mut count) = (V::zero(), V::zero(), V::zero());
         let (mut velocity_gradient, mut pressure_gradient) = ([[V::zero(); D]; D], [V::zero(); D]);
         near.for_each(
             near.row.all(),
             #[inline(always)]
-            |j, slope: V, r_ij_of_frame| {
-                let r_ij = from(here, &position[j]);
-                let square = norm_squared(r_ij) + smallest;
-                let distance = square.sqrt();
-                // The row also holds particles beyond the support of this lane, which must not count.
-                let inside = norm_squared(r_ij_of_frame).below(limit);
-                add_product(&mut asymmetry, inside / (square * distance), r_ij);
-                distances += inside * distance;
-                count += inside;
-                let u_ij = from(u, &velocity[j]);
-                let weight = inside * self.kernel.value(distance);
-                add_product(&mut relative, weight, u_ij);
-                total += weight;
+            |j, slope: V, r_ij| {
                 for k in 0..D {
-                    // Minus u_ij, because ∇u sums u_j − u_i.
-                    add_product(&mut velocity_gradient[k], (V::zero() - u_ij[k]) * slope, r_ij_of_frame);
+                    add_product(&mut velocity_gradient[k], (V::splat(velocity[j][k]) - u[k]) * slope, r_ij);
                 }
-                add_product(&mut pressure_gradient, (V::splat(pressure[j]) - p) * slope, r_ij_of_frame);
+                add_product(&mut pressure_gradient, (V::splat(pressure[j]) - p) * slope, r_ij);
             },
         );
-        let (asymmetry, relative) = (vectors(asymmetry), vectors(relative));
-        let [total, distances, count] = [total, distances, count].map(V::store);
         let (velocity_gradient, pressure_gradient) = (matrices(velocity_gradient), vectors(pressure_gradient));
         let corrections = near.corrections();
         std::array::from_fn(|lane| {
@@ -103,14 +85,60 @@ impl<K: Kernel, const D: usize> Operator<D> for Displacement<'_, K, D> {
     }
 }
 
-impl<K, const D: usize> Displacement<'_, K, D> {
+/// The sums of (18), of the particle of each lane.
+struct Surroundings<V, const D: usize> {
+    /// Σ r_ij h³ / r_ij³.
+    asymmetry: [V; D],
+    /// Σ w u_ij and Σ w, w the kernel without its factor.
+    relative: [V; D],
+    total: V,
+    /// Σ r_ij / h, and the number of neighbours with the particle itself.
+    distances: V,
+    count: V,
+}
+
+impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
+    /// At r^{n+1}, over the neighbours in the frame of the last derivatives. Distances are evaluated in single precision.
+    #[inline(always)]
+    fn surroundings<V: Lanes>(&self, near: Neighbourhood<D>) -> Surroundings<V, D> {
+        let Particles { position, velocity, .. } = self.particles;
+        let here: [V; D] = near.cluster.vectors(position);
+        let here_in_frame: [V; D] = near.cluster.vectors(near.position);
+        let u: [V; D] = near.cluster.vectors(velocity);
+        let limit = V::splat(self.settings.neighbour_distance().powi(2));
+        let (mut asymmetry, mut relative) = ([V::zero(); D], [V::zero(); D]);
+        let (mut total, mut distances, mut count) = (V::zero(), V::zero(), V::zero());
+        for two in near.row.all().chunks(2) {
+            // An odd last entry stands twice, the second time unused.
+            let [first, second] = [two[0].j(), two[two.len() - 1].j()];
+            let r_ij = [from(here, &position[first]), from(here, &position[second])];
+            let q = self.kernel.ratios([norm_squared(r_ij[0]), norm_squared(r_ij[1])]);
+            let distance = V::split(q);
+            let inverse_cube = V::split(V::Singles::splat(1.0) / (q * q * q));
+            let weight = V::split(K::value(q));
+            for (k, entry) in two.iter().enumerate() {
+                // The row also holds particles beyond the support of this lane, which must not count.
+                let inside = norm_squared(from(here_in_frame, &near.position[entry.j()])).below(limit);
+                add_product(&mut asymmetry, inside * inverse_cube[k], r_ij[k]);
+                distances += inside * distance[k];
+                count += inside;
+                let weight = inside * weight[k];
+                add_product(&mut relative, weight, from(u, &velocity[entry.j()]));
+                total += weight;
+            }
+        }
+        Surroundings { asymmetry, relative, total, distances, count }
+    }
+
     /// δr (18), never longer than the limit.
     fn limited(&self, asymmetry: Vector<D>, mean_distance: f64, relative_speed: f64) -> Vector<D> {
         let speed = match self.settings.shifting {
             Shifting::Xsph => relative_speed,
             _ => self.settings.shift_coefficient * self.velocity_max,
         };
-        let shift = asymmetry * (mean_distance * mean_distance * speed * self.time_step);
+        // The h³ of the one and the h² of the other leave 1/h.
+        let scale = mean_distance * mean_distance / self.settings.smoothing_length();
+        let shift = asymmetry * (scale * speed * self.time_step);
         let (length, limit) = (shift.norm(), self.settings.shift_limit * self.settings.particle_spacing);
         if length > limit { shift * (limit / length) } else { shift }
     }

@@ -150,7 +150,9 @@ impl<const D: usize> Simulation<D> {
         // Algorithm 1 moves particles while the list is in use: twice u_max Δt, and a fifth for acceleration within the step.
         let skin = match self.settings.derivative_frame {
             DerivativeFrame::Updated => {
-                2.4 * (self.velocity_max() * self.settings.time_step).min(self.settings.particle_spacing)
+                let velocity_max = self.velocity_max();
+                let time_step = self.time_step(velocity_max).unwrap_or(self.settings.time_step);
+                2.4 * (velocity_max * time_step).min(self.settings.particle_spacing)
             }
             DerivativeFrame::Initial => 0.0,
         };

@@ -1,9 +1,10 @@
 //! The stencil: all that the derivatives need to know of the particle positions of one frame. (14) (17)
 
 use crate::kernel::{Kernel, Smoothing};
-use crate::lanes::{Lanes, add_product, from, matrices, norm_squared};
+use crate::lanes::{Lanes, from, matrices, norm_squared};
 use crate::neighbours::{Cluster, Entry, NeighbourList, Row, Visit, VisitMut};
 use crate::operators::{Neighbourhood, Operator};
+use crate::parallel;
 use crate::particles::{Matrix, Particles, Vector};
 use crate::settings::Settings;
 use crate::with_kernel;
@@ -34,7 +35,8 @@ pub struct Correction<const D: usize> {
 impl<const D: usize> Stencil<D> {
     /// Volumes, slopes and corrections at the present positions. `mirror` copies the volumes of real particles to their images.
     pub fn evaluate(&mut self, settings: &Settings, particles: &Particles<D>, mirror: impl Fn(&mut [f64])) {
-        self.position.clone_from(&particles.position);
+        self.position.resize(particles.len(), Vector::zeros());
+        parallel::for_each(&mut self.position, |i, position| *position = particles.position[i]);
         self.volume.resize(particles.len(), 0.0);
         self.correction.resize(particles.real, Correction::of(&Matrix::identity()));
         let (position, real) = (&self.position, particles.real);
@@ -69,7 +71,13 @@ impl<const D: usize> Stencil<D> {
     ) {
         // A vector of () takes no memory.
         let mut nothing = vec![(); out.len()];
-        self.for_each(operator, out, &mut nothing, |i, value, out, ()| f(i, value, out));
+        self.for_each(
+            operator,
+            out,
+            &mut nothing,
+            #[inline(always)]
+            |i, value, out, ()| f(i, value, out),
+        );
     }
 }
 
@@ -108,11 +116,11 @@ impl<K: Kernel, const D: usize> VisitMut<f64> for Volumes<'_, K, D> {
     fn visit<V: Lanes>(&self, cluster: Cluster, entries: &mut [Entry], volume: &mut [f64]) {
         let here: [V; D] = cluster.vectors(self.position);
         let nominal = V::splat(self.nominal);
-        let square = |entry: &Entry| norm_squared(from(here, &self.position[entry.j()]));
         let mut sum = V::zero();
         for two in entries.chunks_mut(2) {
-            let squares = [square(&two[0]), square(&two[two.len() - 1])];
-            let (values, slopes) = self.kernel.evaluate(squares);
+            // An odd last entry stands twice, the second time unused.
+            let [first, second] = [two[0].j(), two[two.len() - 1].j()].map(|j| &self.position[j]);
+            let (values, slopes) = self.kernel.evaluate([norm_squared(from(here, first)), norm_squared(from(here, second))]);
             for ((entry, value), slope) in two.iter_mut().zip(values).zip(slopes) {
                 sum += value;
                 entry.set_slopes(slope * nominal);
@@ -141,11 +149,16 @@ impl<const D: usize> VisitMut<Correction<D>> for Corrections<'_, D> {
             entry.set_slopes(entry.slopes::<V>() * V::splat(self.volume[j] * inverse));
             let (slope, r_ij) = (entry.slopes::<V>(), from(here, &self.position[j]));
             for k in 0..D {
-                add_product(&mut alpha[k], slope * r_ij[k], r_ij);
+                let weight = slope * r_ij[k];
+                for l in 0..=k {
+                    alpha[k][l] += weight * r_ij[l];
+                }
             }
         }
-        let alpha = matrices(alpha);
-        correction.iter_mut().zip(alpha).for_each(|(correction, alpha)| *correction = Correction::of(&-alpha));
+        for (correction, mut alpha) in correction.iter_mut().zip(matrices(alpha)) {
+            alpha.fill_upper_triangle_with_lower_triangle();
+            *correction = Correction::of(&-alpha);
+        }
     }
 }
 

@@ -75,21 +75,39 @@ fn check<const D: usize>(points: Vec<Vector<D>>, boundary: &str, solid: u64) -> 
     Ok(())
 }
 
+/// Particles in no order at all: those of a row lie anywhere.
+fn check_scattered<const D: usize>(points: Vec<Vector<D>>) -> Result<(), TestCaseError> {
+    let settings = common::settings::<D>(0.025, "none");
+    let mut particles = common::particles(points);
+    let mut frame = Frame::default();
+    frame.search(&settings, &mut particles, 0.0, false);
+    let radius = settings.support_radius();
+    let expected = brute_force_neighbours(&particles.position, particles.real, radius);
+    prop_assert_eq!(listed(&frame, &particles, radius), expected);
+    Ok(())
+}
+
 /// Particles that move within the step by less than half the skin need no new search, those that move farther get one.
-fn check_skin<const D: usize>(points: Vec<Vector<D>>, skin: f64, distance: f64) -> Result<(), TestCaseError> {
-    let settings = common::settings::<D>(0.1, "none");
+fn check_skin(points: Vec<Vector<2>>, boundary: &str, skin: f64, distance: f64) -> Result<(), TestCaseError> {
+    let mut value = common::settings_value::<2>(0.1, boundary);
+    value["derivative_frame"] = "updated".into();
+    let settings = common::parse(&value);
     let mut particles = common::particles(points);
     let mut frame = Frame::default();
     frame.search(&settings, &mut particles, skin, true);
-    for (i, position) in particles.position.iter_mut().enumerate() {
+    for i in 0..particles.real {
         let angle = i as f64;
-        position[0] += distance * angle.cos();
-        position[1] += distance * angle.sin();
+        particles.position[i] += Vector::from([angle.cos(), angle.sin()]) * distance;
     }
+    frame.images.positions(&mut particles.position);
     frame.update(&settings, &particles);
     let radius = settings.support_radius();
     let expected = brute_force_neighbours(&particles.position, particles.real, radius);
     prop_assert_eq!(listed(&frame, &particles, radius), expected);
+    if distance <= skin {
+        let counts: Vec<usize> = listed(&frame, &particles, radius).iter().map(Vec::len).collect();
+        prop_assert_eq!(counts, counts_by_images(&settings, &particles));
+    }
     Ok(())
 }
 
@@ -112,9 +130,22 @@ proptest! {
     }
 
     #[test]
-    fn moved_particles_keep_all_their_neighbours(points in points::<2>(400), skin in 0.0..0.1f64, distance in 0.0..0.1f64) {
-        check_skin(points, skin, distance)?;
+    fn search_among_scattered_particles_finds_what_brute_force_finds(flat in points::<2>(800), solid in points::<3>(800)) {
+        check_scattered(flat)?;
+        check_scattered(solid)?;
     }
+
+    #[test]
+    fn moved_particles_keep_all_their_neighbours(
+        points in points::<2>(400), boundary in common::boundary(), skin in 0.0..0.1f64, part in 0.0..1.0f64,
+    ) {
+        check_skin(points, boundary, skin, part * skin)?;
+    }
+}
+
+#[test]
+fn a_list_without_a_skin_is_renewed_when_anything_moves() {
+    check_skin(common::lattice::<2>(12, 0.3), "none", 0.0, 0.05).expect("the list is complete");
 }
 
 #[test]

@@ -1,11 +1,16 @@
 //! The operators on disordered particles: exact for linear fields, consistent for quadratic ones, in 2-D and 3-D.
 
 use alsph::frame::Frame;
+use alsph::kernel::{Kernel, QuinticSpline, Smoothing, WendlandC2, WendlandC4};
+use alsph::lanes::{LANES, Portable};
+use alsph::neighbours::{Cluster, brute_force_neighbours};
 use alsph::operators::{
-    Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, Operator, VelocityGradient, vector_laplacian,
+    Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, Neighbourhood, Operator, VelocityGradient,
+    vector_laplacian,
 };
 use alsph::settings::Settings;
-use alsph::{Particles, Vector};
+use alsph::shifting::shift;
+use alsph::{ParticleKind, Particles, Vector};
 use approx::assert_relative_eq;
 use proptest::prelude::*;
 
@@ -17,11 +22,16 @@ struct Set<const D: usize> {
 }
 
 impl<const D: usize> Set<D> {
-    /// A box of disordered particles without walls: those at its sides have one-sided neighbourhoods.
+    /// A box of disordered particles without walls, every third one solid: those at its sides have one-sided neighbourhoods.
     fn new(side: usize, disorder: f64, settings: &Settings) -> Self {
         let mut particles = common::particles(common::lattice::<D>(side, disorder));
+        particles.kind.iter_mut().step_by(3).for_each(|kind| *kind = ParticleKind::Solid);
+        Self::of(particles, settings, true)
+    }
+
+    fn of(mut particles: Particles<D>, settings: &Settings, reorder: bool) -> Self {
         let mut frame = Frame::default();
-        frame.search(settings, &mut particles, 0.0, true);
+        frame.search(settings, &mut particles, 0.0, reorder);
         Self { particles, frame }
     }
 
@@ -82,6 +92,125 @@ proptest! {
         linear_fields_are_exact::<2>(14, disorder, slope, offset);
         linear_fields_are_exact::<3>(9, disorder, slope, offset);
     }
+}
+
+/// Operators do not depend on how particles are sorted into clusters, but for the order of the sums.
+#[test]
+fn operators_do_not_depend_on_the_order_of_the_particles() {
+    let settings = common::settings::<2>(0.05, "none");
+    let sorted = Set::<2>::new(20, 0.3, &settings);
+    let mut particles = common::particles(common::lattice::<2>(20, 0.3));
+    particles.kind.iter_mut().step_by(3).for_each(|kind| *kind = ParticleKind::Solid);
+    let scattered: Vec<u32> = (0..400).map(|i| (i * 171) % 400).collect();
+    particles.reorder(&scattered);
+    let scattered = Set::of(particles, &settings, false);
+    let by_id = |set: &Set<2>| {
+        let field = set.field(|x| (7.0 * x[0]).sin() * x[1]);
+        let mut values: Vec<_> = set.particles.id.iter().zip(set.apply(Gradient(&field))).collect();
+        values.sort_by_key(|(id, _)| **id);
+        values.into_iter().map(|(_, value)| value).collect::<Vec<_>>()
+    };
+    for (a, b) in by_id(&sorted).iter().zip(by_id(&scattered)) {
+        assert_relative_eq!(*a, b, epsilon = 1e-11);
+    }
+}
+
+/// Every instruction set gives the same bits.
+#[test]
+fn portable_lanes_give_the_bits_of_the_machines() {
+    let set = Set::<3>::new(9, 0.3, &common::settings::<3>(1.0 / 9.0, "none"));
+    let velocity = set.field(|x| Vector::from([x[0] * x[1], x[2].sin(), x[0] - x[1]]));
+    let operator =
+        || LaplacianAndDivergence { velocity: &velocity, seen: |s: usize, i: usize| velocity[s] * 2.0 - velocity[i] };
+    let values = set.apply(operator());
+    let stencil = &set.frame.stencil;
+    for first in (0..set.particles.real).step_by(LANES) {
+        let cluster = Cluster { first, count: LANES.min(set.particles.real - first) };
+        let (row, _) = stencil.neighbours.row(first);
+        let near = Neighbourhood { cluster, row, position: &stencil.position, correction: &stencil.correction };
+        let portable = operator().apply::<Portable>(near);
+        assert_eq!(values[first..first + cluster.count], portable[..cluster.count]);
+    }
+}
+
+/// Volumes and slopes against plain sums in double precision.
+fn check_stencil<K: Kernel, const D: usize>(side: usize, kernel: &str, ratio: f64) {
+    let mut value = common::settings_value::<D>(1.0 / side as f64, "none");
+    (value["kernel"], value["smoothing_ratio"]) = (kernel.into(), ratio.into());
+    let settings = common::parse(&value);
+    let set = Set::<D>::new(side, 0.3, &settings);
+    let smoothing = Smoothing::<K>::new(settings.smoothing_length(), D);
+    let (position, stencil) = (&set.particles.position, &set.frame.stencil);
+    let near = brute_force_neighbours(position, set.particles.real, settings.support_radius());
+    let volume: Vec<f64> = (0..set.particles.real)
+        .map(|i| {
+            let others: f64 = near[i].iter().map(|&j| smoothing.value((position[i] - position[j as usize]).norm())).sum();
+            1.0 / (others + smoothing.value(0.0))
+        })
+        .collect();
+    let largest = smoothing.slope(0.3 / side as f64).abs() * settings.particle_spacing.powi(D as i32);
+    for i in 0..set.particles.real {
+        assert_relative_eq!(stencil.volume[i], volume[i], max_relative = 1e-5);
+        let (row, lane) = stencil.neighbours.row(i);
+        for entry in row.all().iter().filter(|entry| entry.j() != i) {
+            let distance = (position[i] - position[entry.j()]).norm();
+            assert_relative_eq!(entry.slope(lane), volume[entry.j()] * smoothing.slope(distance), epsilon = 1e-5 * largest);
+        }
+    }
+}
+
+#[test]
+fn volumes_and_slopes_are_those_of_plain_sums() {
+    check_stencil::<QuinticSpline, 2>(14, "quintic_spline", 4.0 / 3.0);
+    check_stencil::<QuinticSpline, 3>(9, "quintic_spline", 4.0 / 3.0);
+    check_stencil::<WendlandC2, 2>(14, "wendland_c2", 1.6);
+    check_stencil::<WendlandC4, 3>(9, "wendland_c4", 1.6);
+}
+
+/// The displacement and what is carried along, against plain sums of (18) and (19).
+#[test]
+fn shift_is_that_of_plain_sums() {
+    let settings = common::settings::<2>(1.0 / 14.0, "none");
+    let mut set = Set::<2>::new(14, 0.3, &settings);
+    set.particles.velocity = set.field(|x| Vector::from([(5.0 * x[1]).sin(), x[0] * x[1]]));
+    set.particles.pressure = set.field(|x| x[0] - (3.0 * x[1]).cos());
+    let velocity_gradient = set.apply(VelocityGradient(&set.particles.velocity));
+    let pressure_gradient = set.apply(Gradient(&set.particles.pressure));
+    let in_frame = set.particles.position.clone();
+    for (i, x) in set.particles.position.iter_mut().enumerate() {
+        *x += Vector::from([(i as f64).cos(), (i as f64).sin()]) * 0.002;
+    }
+    let before = set.particles.clone();
+    let time_step = 1e-4;
+    shift(&settings, &mut set.particles, &set.frame, time_step, 1.0);
+    let smoothing = Smoothing::<QuinticSpline>::new(settings.smoothing_length(), 2);
+    let near = brute_force_neighbours(&in_frame, before.real, settings.support_radius());
+    let mut moved = 0;
+    for i in 0..before.real {
+        let change = set.particles.position[i] - before.position[i];
+        if before.kind[i] != ParticleKind::Fluid {
+            assert_eq!(change, Vector::<2>::zeros());
+            continue;
+        }
+        let (mut asymmetry, mut relative) = (Vector::<2>::zeros(), Vector::<2>::zeros());
+        let (mut total, mut distances) = (smoothing.value(0.0), 0.0);
+        for j in near[i].iter().map(|&j| j as usize) {
+            let r_ij = before.position[i] - before.position[j];
+            let weight = smoothing.value(r_ij.norm());
+            asymmetry += r_ij / r_ij.norm().powi(3);
+            relative += (before.velocity[i] - before.velocity[j]) * weight;
+            (total, distances) = (total + weight, distances + r_ij.norm());
+        }
+        let expected = asymmetry * ((distances / near[i].len() as f64).powi(2) * relative.norm() / total * time_step);
+        assert!(expected.norm() < settings.shift_limit * settings.particle_spacing);
+        assert_relative_eq!(change, expected, epsilon = 1e-5 * expected.norm());
+        let carried = velocity_gradient[i] * expected;
+        assert_relative_eq!(set.particles.velocity[i] - before.velocity[i], carried, epsilon = 1e-4 * expected.norm());
+        let carried = pressure_gradient[i].dot(&expected);
+        assert_relative_eq!(set.particles.pressure[i] - before.pressure[i], carried, epsilon = 1e-4 * expected.norm());
+        moved += 1;
+    }
+    assert!(moved > 100);
 }
 
 #[test]

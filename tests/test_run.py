@@ -248,7 +248,7 @@ def test_symmetric_flow_has_no_lift(small):
     simulation = small.replace(perturbation=0.0).simulation()
     simulation.advance(30)
     history = simulation.history()
-    assert np.abs(history["lift_coefficient"]).max() < 1e-9
+    assert np.abs(history["lift_coefficient"]).max() < 1e-6  # kernel slopes are rounded to f32, 6e-8
     # Not for want of forces; the drag rings after the impulsive start, so its sign at one step says nothing.
     assert np.abs(history["drag_coefficient"]).max() > 0.5
 
@@ -286,7 +286,8 @@ def test_as_much_leaves_as_enters(small):
     entered, left = (history[name][-1] for name in ("mass_in", "mass_out"))
     assert entered == pytest.approx(3 * small.height, rel=0.05)
     assert left == pytest.approx(entered, rel=0.05)
-    assert history["fluid"] == pytest.approx(np.full(simulation.step, simulation.counts["fluid"]), rel=0.03)
+    fluid = history["fluid"].astype(float)
+    assert np.abs(fluid / fluid[0] - 1).max() < 0.03
 
 
 def test_only_a_second_wish_to_stop_interrupts_at_once(monkeypatch):

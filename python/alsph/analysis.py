@@ -158,7 +158,9 @@ def averaging_window(time: FloatArray, drag: FloatArray, lift: FloatArray) -> Wi
     if len(edges) - 1 < SETTLED_CYCLES:
         halfway = 0.5 * (time[0] + time[-1])
         edges = np.linspace(halfway, time[-1], BATCHES_WITHOUT_CYCLES + 1)
-        return Window(edges, 0, False, "no regular shedding found: later half of the record")
+        bodiless = bool(np.isnan(lift).all())
+        rule = "later half of the record" if bodiless else "no regular shedding found: later half of the record"
+        return Window(edges, 0, False, rule)
     first = _first_settled_cycle(time, drag, lift, edges)
     if first is None:
         edges = edges[(len(edges) - 1) // 2 :]

@@ -266,10 +266,10 @@ class Run:
             "averaged from tU/D": Estimate(self.window.start),
             "averaged to tU/D": Estimate(self.window.end),
             "averaging rule": self.window.rule,
-            "shedding periods": self.window.periods,
         }
         if self.bodies:
             results |= {
+                "shedding periods": self.window.periods,
                 "mean drag coefficient": self.drag.mean,
                 "mean drag coefficient, pressure part": self.drag.pressure,
                 "mean drag coefficient, viscous part": self.drag.viscous,

@@ -8,11 +8,13 @@ use crate::particles::{ParticleKind, Particles, Vector};
 use rayon::prelude::*;
 use std::ops::Range;
 
+const _: () = assert!(CHUNK.is_multiple_of(LANES));
+
 /// Type of the one number stored a pair.
 #[cfg(not(feature = "double-slopes"))]
-pub type Slope = f32;
+type Slope = f32;
 #[cfg(feature = "double-slopes")]
-pub type Slope = f64;
+type Slope = f64;
 
 /// A neighbour j of one or more particles i of a cluster.
 #[derive(Clone, Copy, Debug)]
@@ -115,7 +117,8 @@ impl Cluster {
     }
 }
 
-/// Work on one cluster after the other; `a` and `b` are the outputs of its particles.
+/// Work on one cluster after the other, such as an operator and what is done with its values; `a` and `b` are the outputs of its
+/// particles.
 pub trait Visit<A, B>: Sync {
     fn visit<V: Lanes>(&self, cluster: Cluster, row: Row<'_>, a: &mut [A], b: &mut [B]);
 }
@@ -127,8 +130,6 @@ pub trait VisitMut<A>: Sync {
 
 #[derive(Debug, Default)]
 struct Chunk {
-    /// Particles of the chunk.
-    count: usize,
     entries: Vec<Entry>,
     /// Start of each row and of its solid part, and the end.
     starts: Vec<[u32; 2]>,
@@ -214,11 +215,11 @@ impl NeighbourList {
         (self.chunks[i / CHUNK].row(i % CHUNK / LANES), i % LANES)
     }
 
-    /// Directed pairs closer than `radius`.
-    pub fn pair_count<const D: usize>(&self, position: &[Vector<D>], radius: f64) -> usize {
+    /// Directed pairs of the real particles that are closer than `radius`.
+    pub fn pair_count<const D: usize>(&self, particles: &Particles<D>, radius: f64) -> usize {
+        let position = &particles.position;
         let near = |i: usize, j: usize| i != j && (position[i] - position[j]).norm_squared() < radius * radius;
-        let real = self.chunks.iter().map(|chunk| chunk.count).sum();
-        (0..real).map(|i| self.row(i).0.all().iter().filter(|entry| near(i, entry.j())).count()).sum()
+        (0..particles.real).map(|i| self.row(i).0.all().iter().filter(|entry| near(i, entry.j())).count()).sum()
     }
 
     /// Entries in the list, each for up to four pairs.
@@ -240,8 +241,7 @@ struct Search<'a, const D: usize> {
 impl<const D: usize> Task for Search<'_, D> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let Chunk { count, entries, starts, near } = self.chunk;
-        *count = self.count;
+        let Chunk { entries, starts, near } = self.chunk;
         let blank = |&index: &u32| Entry { slopes: [0.0; LANES], index };
         let solid = |j: &u32| self.particles.kind[*j as usize] == ParticleKind::Solid;
         entries.clear();
@@ -283,13 +283,15 @@ fn find<'a, V: Lanes, const D: usize>(
             if near.len() < count + length {
                 near.resize(2 * (count + length), 0);
             }
-            let coordinates = run.coordinates.map(|x| &x[..length]);
+            let (slots, coordinates) = (&mut near[count..][..length], run.coordinates.map(|x| &x[..length]));
+            let mut found = 0;
             for (k, &j) in run.indices.iter().enumerate() {
                 let r_ij = from(here, &Vector::from_fn(|axis, _| coordinates[axis][k]));
                 // Every candidate is written, and the next one overwrites it unless it counts: a branch would be mispredicted.
-                near[count] = j;
-                count += usize::from(norm_squared(r_ij).any_below(limit));
+                slots[found] = j;
+                found += usize::from(norm_squared(r_ij).any_below(limit));
             }
+            count += found;
         },
     );
     &near[..count]

@@ -6,6 +6,7 @@ use crate::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndD
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{DerivativeFrame, Settings, VelocityLaplacian, WallPressure, WallVelocity};
+use rayon::prelude::*;
 
 /// How a step ended.
 #[derive(Clone, Copy, Debug, Default)]
@@ -232,14 +233,12 @@ fn extrapolate_wall_velocity<const D: usize>(
 /// 2012, eq. 27; bodies do not accelerate).
 fn extrapolate_wall_pressure<const D: usize>(settings: &Settings, particles: &mut Particles<D>, frame: &Frame<D>) {
     let gravity = Vector::<D>::from_column_slice(&settings.body_force);
-    let Particles { real, kind, pressure, .. } = particles;
-    let fluid = pressure.clone();
-    parallel::for_each(&mut pressure[..*real], |i, p| {
-        if kind[i] == ParticleKind::Solid {
-            let at = |j: usize, r_ij: Vector<D>| [fluid[j] + settings.density * gravity.dot(&r_ij)];
-            *p = shepard(settings, &frame.stencil, i, at).map_or(0.0, |[average]| average);
-        }
-    });
+    let Particles { real, kind, pressure, .. } = &*particles;
+    let at = |j: usize, r_ij: Vector<D>| [pressure[j] + settings.density * gravity.dot(&r_ij)];
+    let solids = (0..*real).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
+    let average = |i| (i, shepard(settings, &frame.stencil, i, at).map_or(0.0, |[average]| average));
+    let extrapolated: Vec<(usize, f64)> = solids.map(average).collect();
+    extrapolated.into_iter().for_each(|(i, p)| particles.pressure[i] = p);
 }
 
 fn copy<T: Copy>(from: &[T], to: &mut Vec<T>) {
