@@ -166,18 +166,22 @@ impl<K: Kernel> Smoothing<K> {
         R::splat(self.factor * self.inverse_length) * derivative / distance
     }
 
-    /// q = r/h for two sets of squared distances, in single precision. Zero distances give a small q instead.
+    /// q = r/h of a squared distance. Zero gives a small q instead.
     #[inline(always)]
-    pub fn ratios<V: Lanes>(&self, squares: [V; 2]) -> V::Singles {
-        let (scale, smallest) = (V::splat(self.inverse_length * self.inverse_length), V::splat(SMALLEST));
-        V::join(squares[0] * scale + smallest, squares[1] * scale + smallest).sqrt()
+    pub fn ratio<R: Real>(&self, square: R) -> R {
+        self.ratio_squared(square).sqrt()
+    }
+
+    #[inline(always)]
+    fn ratio_squared<R: Real>(&self, square: R) -> R {
+        square * R::splat(self.inverse_length * self.inverse_length) + R::splat(SMALLEST)
     }
 
     /// W(r) and its slope (dW/dr) / r for two sets of squared distances, in single precision (the slopes are stored in it).
     #[cfg(not(feature = "double-slopes"))]
     #[inline(always)]
     pub fn evaluate<V: Lanes>(&self, squares: [V; 2]) -> ([V; 2], [V; 2]) {
-        let q = self.ratios(squares);
+        let q = V::join(self.ratio_squared(squares[0]), self.ratio_squared(squares[1])).sqrt();
         let ([w0, w1], [s0, s1]) = (V::split(K::value(q)), V::split(K::derivative(q) / q));
         let value = V::splat(self.factor);
         let slope = V::splat(self.factor * self.inverse_length * self.inverse_length);
@@ -188,8 +192,8 @@ impl<K: Kernel> Smoothing<K> {
     #[cfg(feature = "double-slopes")]
     #[inline(always)]
     pub fn evaluate<V: Lanes>(&self, squares: [V; 2]) -> ([V; 2], [V; 2]) {
-        let smallest = V::splat(SMALLEST / (self.inverse_length * self.inverse_length));
-        let [first, second] = [(squares[0] + smallest).sqrt(), (squares[1] + smallest).sqrt()];
+        let length = V::splat(1.0 / self.inverse_length);
+        let [first, second] = [self.ratio(squares[0]) * length, self.ratio(squares[1]) * length];
         ([self.value(first), self.value(second)], [self.slope(first), self.slope(second)])
     }
 }

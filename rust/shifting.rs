@@ -2,7 +2,7 @@
 
 use crate::frame::Frame;
 use crate::kernel::{Kernel, Smoothing};
-use crate::lanes::{LANES, Lanes, Real, add_product, from, matrices, norm_squared, vectors};
+use crate::lanes::{LANES, Lanes, add_product, from, matrices, norm_squared, vectors};
 use crate::operators::{Neighbourhood, Operator};
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
@@ -98,7 +98,8 @@ struct Surroundings<V, const D: usize> {
 }
 
 impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
-    /// At r^{n+1}, over the neighbours in the frame of the last derivatives. Distances are evaluated in single precision.
+    /// At r^{n+1}, over the neighbours in the frame of the last derivatives. In double precision: the rounding of single would
+    /// break the symmetry of a symmetric flow within a few steps.
     #[inline(always)]
     fn surroundings<V: Lanes>(&self, near: Neighbourhood<D>) -> Surroundings<V, D> {
         let Particles { position, velocity, .. } = self.particles;
@@ -108,24 +109,17 @@ impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
         let limit = V::splat(self.settings.neighbour_distance().powi(2));
         let (mut asymmetry, mut relative) = ([V::zero(); D], [V::zero(); D]);
         let (mut total, mut distances, mut count) = (V::zero(), V::zero(), V::zero());
-        for two in near.row.all().chunks(2) {
-            // An odd last entry stands twice, the second time unused.
-            let [first, second] = [two[0].j(), two[two.len() - 1].j()];
-            let r_ij = [from(here, &position[first]), from(here, &position[second])];
-            let q = self.kernel.ratios([norm_squared(r_ij[0]), norm_squared(r_ij[1])]);
-            let distance = V::split(q);
-            let inverse_cube = V::split(V::Singles::splat(1.0) / (q * q * q));
-            let weight = V::split(K::value(q));
-            for (k, entry) in two.iter().enumerate() {
-                // The row also holds particles beyond the support of this lane, which must not count.
-                let inside = norm_squared(from(here_in_frame, &near.position[entry.j()])).below(limit);
-                add_product(&mut asymmetry, inside * inverse_cube[k], r_ij[k]);
-                distances += inside * distance[k];
-                count += inside;
-                let weight = inside * weight[k];
-                add_product(&mut relative, weight, from(u, &velocity[entry.j()]));
-                total += weight;
-            }
+        for entry in near.row.all() {
+            // The row also holds particles beyond the support of this lane, which must not count.
+            let inside = norm_squared(from(here_in_frame, &near.position[entry.j()])).below(limit);
+            let r_ij = from(here, &position[entry.j()]);
+            let q = self.kernel.ratio(norm_squared(r_ij));
+            add_product(&mut asymmetry, inside / (q * q * q), r_ij);
+            distances += inside * q;
+            count += inside;
+            let weight = inside * K::value(q);
+            add_product(&mut relative, weight, from(u, &velocity[entry.j()]));
+            total += weight;
         }
         Surroundings { asymmetry, relative, total, distances, count }
     }
