@@ -2,7 +2,7 @@
 //!
 //! `cargo bench` prints the throughput in elements a second: pairs for search, stencil and operators, particles for a step.
 
-use alsph::frame::Frame;
+use alsph::frame::{Frame, Travel};
 use alsph::lanes::LANES;
 use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, VelocityGradient};
 use alsph::{Clock, Matrix, Simulation, Vector};
@@ -20,7 +20,7 @@ fn stages(criterion: &mut Criterion) {
         let settings = settings::<2>(side, "initial");
         let mut particles = particles::<2>(side);
         let mut frame = Frame::default();
-        frame.search(&settings, &mut particles, 0.0, true);
+        frame.search(&settings, &mut particles, Travel::default(), true);
         let count = particles.real;
         let pairs = frame.stencil.neighbours.pair_count(&particles, settings.support_radius());
         let entries = frame.stencil.neighbours.entry_count();
@@ -32,7 +32,7 @@ fn stages(criterion: &mut Criterion) {
         let mut group = criterion.benchmark_group("stages");
         group.throughput(Throughput::Elements(pairs as u64)).sample_size(20);
         group.bench_function(BenchmarkId::new("search and stencil", count), |b| {
-            b.iter(|| frame.search(&settings, &mut particles, 0.0, true));
+            b.iter(|| frame.search(&settings, &mut particles, Travel::default(), true));
         });
         group.bench_function(BenchmarkId::new("stencil", count), |b| {
             b.iter(|| frame.update(&settings, &particles));

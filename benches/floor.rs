@@ -3,7 +3,7 @@
 //!
 //! `cargo bench --bench floor`
 
-use alsph::frame::Frame;
+use alsph::frame::{Frame, Travel};
 use alsph::lanes::{LANES, Lanes, Task, run};
 use alsph::neighbours::Entry;
 use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence};
@@ -153,7 +153,7 @@ fn main() {
     let settings = lattice::settings::<2>(SIDE, "initial");
     let mut particles = lattice::particles::<2>(SIDE);
     let mut frame = Frame::default();
-    frame.search(&settings, &mut particles, 0.0, true);
+    frame.search(&settings, &mut particles, Travel::default(), true);
     let (stencil, count) = (&frame.stencil, particles.real);
     let pairs = stencil.neighbours.pair_count(&particles, settings.support_radius()) as f64;
     let entries = stencil.neighbours.entry_count() as f64;

@@ -2,63 +2,86 @@
 
 use crate::boundary::Images;
 use crate::neighbours::Grid;
-use crate::parallel::CHUNK;
-use crate::particles::{Particles, Vector};
+use crate::parallel::{self, CHUNK};
+use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{DerivativeFrame, Settings};
 use crate::stencil::Stencil;
 use rayon::prelude::*;
+
+/// How far the particles will go while the neighbours of a frame are in use.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Travel {
+    pub time_step: f64,
+    pub velocity_max: f64,
+}
+
+/// Part of u_max Δt by which two particles may approach each other beyond what their velocities at r^n make them, before the
+/// neighbours are searched again: what acceleration within the step adds.
+const SKIN: f64 = 0.4;
 
 #[derive(Debug, Default)]
 pub struct Frame<const D: usize> {
     pub images: Images<D>,
     pub grid: Grid<D>,
     pub stencil: Stencil<D>,
-    /// Positions that the neighbour list was made at, and how much two particles may approach before it must be renewed.
-    searched: Vec<Vector<D>>,
+    /// Where the particles are expected while the list is in use: r^n + u^n Δt. Empty if the list is for r^n only.
+    expected: Vec<Vector<D>>,
+    /// How much two particles may approach each other from there.
     skin: f64,
+    /// Distance within which the grid finds particles.
+    reach: f64,
 }
 
 impl<const D: usize> Frame<D> {
-    /// Create the images of the particles, search neighbours and evaluate the stencil. The list stays complete until two
-    /// particles have approached each other by `skin`. With `reorder` the particles are first put into cell order.
-    pub fn search(&mut self, settings: &Settings, particles: &mut Particles<D>, skin: f64, reorder: bool) {
-        let radius = search_radius(settings) + skin;
-        self.skin = skin;
+    /// Create the images of the particles, search neighbours and evaluate the stencil. With `reorder` the particles are first
+    /// put into cell order. If the derivatives will follow the particles, the list holds neighbours at r^n and at r^n + u^n Δt.
+    pub fn search(&mut self, settings: &Settings, particles: &mut Particles<D>, travel: Travel, reorder: bool) {
+        let lasts = settings.derivative_frame == DerivativeFrame::Updated && !settings.search_every_iteration;
+        let distance = (travel.velocity_max * travel.time_step).min(settings.particle_spacing);
+        self.skin = if lasts { SKIN * distance } else { 0.0 };
+        self.reach = search_radius(settings) + self.skin + 2.0 * distance;
         particles.drop_images();
         if reorder {
-            self.grid.build(&particles.position, radius, settings.bounds());
+            self.grid.build(&particles.position, self.reach, settings.bounds());
             particles.reorder(self.grid.order());
         }
-        // Twice the skin, so that a list renewed within the step finds its images too.
-        self.images.create(particles, &settings.domain, radius + skin);
+        self.images.create(particles, &settings.domain, self.reach + self.skin);
+        self.expected.clear();
+        if lasts {
+            self.expected.extend_from_slice(&particles.position);
+            let still =
+                |i: usize| particles.kind[i] == ParticleKind::Solid && !settings.bodies[particles.body[i] as usize].moves;
+            parallel::for_each(&mut self.expected, |i, r| {
+                if !still(i) {
+                    *r += particles.velocity[i] * travel.time_step;
+                }
+            });
+        }
         self.list_neighbours(settings, particles);
         self.evaluate(settings, particles);
     }
 
     /// Evaluate the stencil again after particles (and images) have moved within the step.
     pub fn update(&mut self, settings: &Settings, particles: &Particles<D>) {
-        if settings.search_every_iteration || self.is_stale(particles) {
+        if self.expected.is_empty() {
+            self.list_neighbours(settings, particles);
+        } else if self.is_stale(particles) {
+            self.expected.copy_from_slice(&particles.position);
             self.list_neighbours(settings, particles);
         }
         self.evaluate(settings, particles);
     }
 
     fn list_neighbours(&mut self, settings: &Settings, particles: &Particles<D>) {
-        // A list for one set of positions only needs no skin.
-        let lasts = settings.derivative_frame == DerivativeFrame::Updated && !settings.search_every_iteration;
-        let radius = search_radius(settings) + if lasts { self.skin } else { 0.0 };
-        self.grid.build(&particles.position, radius, settings.bounds());
-        self.stencil.neighbours.search(particles, &self.grid, radius);
-        self.searched.clear();
-        if lasts {
-            self.searched.extend_from_slice(&particles.position[..particles.real]);
-        }
+        self.grid.build(&particles.position, self.reach, settings.bounds());
+        let expected = (!self.expected.is_empty()).then_some(&self.expected[..]);
+        self.stencil.neighbours.search(particles, expected, &self.grid, search_radius(settings) + self.skin);
     }
 
     fn is_stale(&self, particles: &Particles<D>) -> bool {
         let limit = (0.5 * self.skin).powi(2);
-        let moved = self.searched.par_iter().zip(&particles.position).with_min_len(CHUNK);
-        moved.any(|(old, new)| (new - old).norm_squared() > limit)
+        let moved = self.expected[..particles.real].par_iter().zip(&particles.position).with_min_len(CHUNK);
+        moved.any(|(expected, position)| (position - expected).norm_squared() > limit)
     }
 
     fn evaluate(&mut self, settings: &Settings, particles: &Particles<D>) {

@@ -37,14 +37,14 @@ impl Kernel for QuinticSpline {
     fn value<R: Real>(q: R) -> R {
         let (a, b, c) = (Self::below(3.0, q), Self::below(2.0, q), Self::below(1.0, q));
         let (a2, b2, c2) = (a * a, b * b, c * c);
-        a * (a2 * a2) - R::splat(6.0) * b * (b2 * b2) + R::splat(15.0) * c * (c2 * c2)
+        (a * (a2 * a2)).plus_product(R::splat(-6.0) * b, b2 * b2).plus_product(R::splat(15.0) * c, c2 * c2)
     }
 
     #[inline(always)]
     fn derivative<R: Real>(q: R) -> R {
         let (a, b, c) = (Self::below(3.0, q), Self::below(2.0, q), Self::below(1.0, q));
         let (a2, b2, c2) = (a * a, b * b, c * c);
-        R::splat(-5.0) * (a2 * a2 - R::splat(6.0) * (b2 * b2) + R::splat(15.0) * (c2 * c2))
+        R::splat(-5.0) * (a2 * a2).plus_product(R::splat(-6.0) * b2, b2).plus_product(R::splat(15.0) * c2, c2)
     }
 }
 
@@ -166,15 +166,20 @@ impl<K: Kernel> Smoothing<K> {
         R::splat(self.factor * self.inverse_length) * derivative / distance
     }
 
-    /// q = r/h of a squared distance. Zero gives a small q instead.
-    #[inline(always)]
-    pub fn ratio<R: Real>(&self, square: R) -> R {
-        self.ratio_squared(square).sqrt()
-    }
-
+    /// q² of a squared distance, q = r/h. Zero gives a small q instead.
     #[inline(always)]
     fn ratio_squared<R: Real>(&self, square: R) -> R {
-        square * R::splat(self.inverse_length * self.inverse_length) + R::splat(SMALLEST)
+        R::splat(SMALLEST).plus_product(square, R::splat(self.inverse_length * self.inverse_length))
+    }
+
+    /// q = r/h and 1/q in double precision, and w(q) in single, for two sets of squared distances.
+    #[inline(always)]
+    pub fn ratios<V: Lanes>(&self, squares: [V; 2]) -> [(V, V, V); 2] {
+        let (s0, s1) = (self.ratio_squared(squares[0]), self.ratio_squared(squares[1]));
+        let q = V::join(s0, s1).sqrt();
+        let ([w0, w1], [y0, y1]) = (V::split(K::value(q)), V::split(V::Singles::splat(1.0) / q));
+        let (y0, y1) = (newton(s0, y0), newton(s1, y1));
+        [(s0 * y0, y0, w0), (s1 * y1, y1, w1)]
     }
 
     /// W(r) and its slope (dW/dr) / r for two sets of squared distances, in single precision (the slopes are stored in it).
@@ -193,9 +198,16 @@ impl<K: Kernel> Smoothing<K> {
     #[inline(always)]
     pub fn evaluate<V: Lanes>(&self, squares: [V; 2]) -> ([V; 2], [V; 2]) {
         let length = V::splat(1.0 / self.inverse_length);
-        let [first, second] = [self.ratio(squares[0]) * length, self.ratio(squares[1]) * length];
+        let [first, second] = squares;
+        let (first, second) = (self.ratio_squared(first).sqrt() * length, self.ratio_squared(second).sqrt() * length);
         ([self.value(first), self.value(second)], [self.slope(first), self.slope(second)])
     }
+}
+
+/// A step of Newton's method from y towards 1/√x, which doubles its digits.
+#[inline(always)]
+fn newton<V: Lanes>(x: V, y: V) -> V {
+    y * V::splat(1.5).plus_product(x * V::splat(-0.5) * y, y)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Four numbers side by side, one for each particle of a cluster: what the loops over pairs compute with.
 //!
 //! [`run`] picks the vector instructions at run time, so that one build is fast on every machine. All versions round alike
-//! (no operation is fused or reordered), so the results are the same to the last bit.
+//! (the same operations are fused, none is reordered), so the results are the same to the last bit.
 
 use crate::particles::{Matrix, Vector};
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
@@ -17,6 +17,8 @@ pub trait Real:
     fn sqrt(self) -> Self;
     /// Its positive part: max(self, 0).
     fn positive(self) -> Self;
+    /// `self + a b`. Lanes round once, after the sum.
+    fn plus_product(self, a: Self, b: Self) -> Self;
 
     #[inline(always)]
     fn zero() -> Self {
@@ -38,6 +40,8 @@ pub trait Lanes: Real {
     /// 1 where `self` is below `limit`, else 0.
     fn below(self, limit: Self) -> Self;
     fn any_below(self, limit: Self) -> bool;
+    /// The smaller of the two.
+    fn least(self, other: Self) -> Self;
 }
 
 /// Work that is compiled for each kind of vector instructions. Mark `run`, and all that takes or gives `V`,
@@ -49,7 +53,11 @@ pub trait Task {
 /// Run `task` with the vector instructions that this machine has.
 pub fn run(task: impl Task) {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi1") && is_x86_feature_detected!("bmi2") {
+    if is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("fma")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+    {
         // SAFETY: the machine has the features that `avx2::run` is compiled for.
         return unsafe { avx2::run(task) };
     }
@@ -71,7 +79,7 @@ pub fn from<V: Lanes, const D: usize>(here: [V; D], there: &Vector<D>) -> [V; D]
 pub fn norm_squared<V: Lanes, const D: usize>(vector: [V; D]) -> V {
     let mut sum = vector[0] * vector[0];
     for component in &vector[1..] {
-        sum += *component * *component;
+        sum = sum.plus_product(*component, *component);
     }
     sum
 }
@@ -80,7 +88,7 @@ pub fn norm_squared<V: Lanes, const D: usize>(vector: [V; D]) -> V {
 #[inline(always)]
 pub fn add_product<V: Lanes, const D: usize>(sum: &mut [V; D], factor: V, vector: [V; D]) {
     for axis in 0..D {
-        sum[axis] += factor * vector[axis];
+        sum[axis] = sum[axis].plus_product(factor, vector[axis]);
     }
 }
 
@@ -127,6 +135,12 @@ impl Real for f64 {
     fn positive(self) -> Self {
         // f64::max would also look for NaN.
         if self > 0.0 { self } else { 0.0 }
+    }
+
+    #[inline(always)]
+    fn plus_product(self, a: Self, b: Self) -> Self {
+        // Fused it would be a call on most machines.
+        self + a * b
     }
 }
 
@@ -182,6 +196,11 @@ macro_rules! portable {
             #[inline(always)]
             fn positive(self) -> Self {
                 Self(self.0.map(|value| if value > 0.0 { value } else { 0.0 }))
+            }
+
+            #[inline(always)]
+            fn plus_product(self, a: Self, b: Self) -> Self {
+                Self(std::array::from_fn(|lane| a.0[lane].mul_add(b.0[lane], self.0[lane])))
             }
         }
 
@@ -240,6 +259,11 @@ impl Lanes for Portable {
     fn any_below(self, limit: Self) -> bool {
         self.0.iter().zip(limit.0).any(|(value, limit)| *value < limit)
     }
+
+    #[inline(always)]
+    fn least(self, other: Self) -> Self {
+        self.with(other, |a, b| if a < b { a } else { b })
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -258,7 +282,7 @@ mod avx2 {
 
     /// # Safety
     /// The machine must have the features named.
-    #[target_feature(enable = "avx2,bmi1,bmi2")]
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2")]
     pub unsafe fn run(task: impl Task) {
         task.run::<Avx2>();
     }
@@ -278,6 +302,11 @@ mod avx2 {
         fn positive(self) -> Self {
             Self(unsafe { _mm256_max_pd(self.0, _mm256_setzero_pd()) })
         }
+
+        #[inline(always)]
+        fn plus_product(self, a: Self, b: Self) -> Self {
+            Self(unsafe { _mm256_fmadd_pd(a.0, b.0, self.0) })
+        }
     }
 
     impl Real for Singles {
@@ -294,6 +323,11 @@ mod avx2 {
         #[inline(always)]
         fn positive(self) -> Self {
             Self(unsafe { _mm256_max_ps(self.0, _mm256_setzero_ps()) })
+        }
+
+        #[inline(always)]
+        fn plus_product(self, a: Self, b: Self) -> Self {
+            Self(unsafe { _mm256_fmadd_ps(a.0, b.0, self.0) })
         }
     }
 
@@ -344,6 +378,11 @@ mod avx2 {
         fn any_below(self, limit: Self) -> bool {
             unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, limit.0)) != 0 }
         }
+
+        #[inline(always)]
+        fn least(self, other: Self) -> Self {
+            Self(unsafe { _mm256_min_pd(self.0, other.0) })
+        }
     }
 
     arithmetic!(
@@ -382,11 +421,13 @@ mod tests {
             let mut sum = a;
             sum += V::load_single(&b.store_single());
             let singles = V::join(a, b);
+            let [third, _] = V::split(singles.plus_product(singles, singles.positive()));
             let [first, second] =
                 V::split(singles * singles.positive().sqrt() + V::Singles::splat(0.1) - V::Singles::splat(0.3) / singles);
             let results = [
-                [a + b, a - b, a * b, a / b, a.positive(), a.positive().sqrt()],
-                [a.below(b), V::splat(self.a[0]), V::zero(), sum, first, second],
+                [a + b, a - b, a * b, a / b, a.positive()],
+                [a.positive().sqrt(), a.plus_product(b, sum), a.least(b), a.below(b), V::splat(self.a[0])],
+                [V::zero(), sum, first, second, third],
             ]
             .concat();
             // The sign of a NaN is nobody's promise.

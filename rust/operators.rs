@@ -113,7 +113,7 @@ impl<const D: usize> Operator<D> for GradientAndLaplacian<'_> {
             |j, slope: V, r_ij| {
                 let [f, g] = self.0[j];
                 add_product(&mut gradient, (V::splat(f) - here[0]) * slope, r_ij);
-                laplacian += (V::splat(g) - here[1]) * slope;
+                laplacian = laplacian.plus_product(V::splat(g) - here[1], slope);
             },
         );
         let (gradient, laplacian, corrections) = (corrected(near, gradient), laplacian.store(), near.corrections());
@@ -146,7 +146,7 @@ impl<const D: usize, F: Fn(usize, usize) -> Vector<D> + Sync> Operator<D> for La
             |s, slope: V, r_ij| {
                 let seen = near.cluster.particles().map(|i| (self.seen)(s, i));
                 for k in 0..D {
-                    laplacian[k] += (V::load(&seen.map(|u| u[k])) - here[k]) * slope;
+                    laplacian[k] = laplacian[k].plus_product(V::load(&seen.map(|u| u[k])) - here[k], slope);
                     add_product(&mut tensor[k], (V::splat(velocity[s][k]) - here[k]) * slope, r_ij);
                 }
             },

@@ -98,8 +98,8 @@ struct Surroundings<V, const D: usize> {
 }
 
 impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
-    /// At r^{n+1}, over the neighbours in the frame of the last derivatives. In double precision: the rounding of single would
-    /// break the symmetry of a symmetric flow within a few steps.
+    /// At r^{n+1}, over the neighbours in the frame of the last derivatives. The distances in double precision: the rounding of
+    /// single would break the symmetry of a symmetric flow within a few steps.
     #[inline(always)]
     fn surroundings<V: Lanes>(&self, near: Neighbourhood<D>) -> Surroundings<V, D> {
         let Particles { position, velocity, .. } = self.particles;
@@ -109,17 +109,22 @@ impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
         let limit = V::splat(self.settings.neighbour_distance().powi(2));
         let (mut asymmetry, mut relative) = ([V::zero(); D], [V::zero(); D]);
         let (mut total, mut distances, mut count) = (V::zero(), V::zero(), V::zero());
-        for entry in near.row.all() {
-            // The row also holds particles beyond the support of this lane, which must not count.
-            let inside = norm_squared(from(here_in_frame, &near.position[entry.j()])).below(limit);
-            let r_ij = from(here, &position[entry.j()]);
-            let q = self.kernel.ratio(norm_squared(r_ij));
-            add_product(&mut asymmetry, inside / (q * q * q), r_ij);
-            distances += inside * q;
-            count += inside;
-            let weight = inside * K::value(q);
-            add_product(&mut relative, weight, from(u, &velocity[entry.j()]));
-            total += weight;
+        for two in near.row.all().chunks(2) {
+            // An odd last entry stands twice, the second time unused.
+            let two_j = [two[0].j(), two[two.len() - 1].j()];
+            let r = [from(here, &position[two_j[0]]), from(here, &position[two_j[1]])];
+            let ratios = self.kernel.ratios([norm_squared(r[0]), norm_squared(r[1])]);
+            for k in 0..two.len() {
+                let (j, r_ij, (q, inverse, value)) = (two_j[k], r[k], ratios[k]);
+                // The row also holds particles beyond the support of this lane, which must not count.
+                let inside = norm_squared(from(here_in_frame, &near.position[j])).below(limit);
+                add_product(&mut asymmetry, inside * inverse * (inverse * inverse), r_ij);
+                distances = distances.plus_product(inside, q);
+                count += inside;
+                let weight = inside * value;
+                add_product(&mut relative, weight, from(u, &velocity[j]));
+                total += weight;
+            }
         }
         Surroundings { asymmetry, relative, total, distances, count }
     }

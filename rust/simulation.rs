@@ -2,7 +2,7 @@
 
 use crate::boundary::{self, Walls};
 use crate::error::{Error, Result, setting};
-use crate::frame::Frame;
+use crate::frame::{Frame, Travel};
 use crate::interpolation::interpolate;
 use crate::loads::loads;
 use crate::neighbours::Grid;
@@ -11,7 +11,7 @@ use crate::parallel;
 use crate::particles::{Matrix, ParticleKind, Particles, Vector};
 use crate::report::{Clock, Report};
 use crate::scheme::{Alsph, Step};
-use crate::settings::{Boundary, DerivativeFrame, Settings};
+use crate::settings::{Boundary, Settings};
 use crate::shifting::shift;
 use rayon::ThreadPool;
 use std::ops::Range;
@@ -147,17 +147,10 @@ impl<const D: usize> Simulation<D> {
         if self.prepared {
             return;
         }
-        // Algorithm 1 moves particles while the list is in use: twice u_max Δt, and a fifth for acceleration within the step.
-        let skin = match self.settings.derivative_frame {
-            DerivativeFrame::Updated => {
-                let velocity_max = self.velocity_max();
-                let time_step = self.time_step(velocity_max).unwrap_or(self.settings.time_step);
-                2.4 * (velocity_max * time_step).min(self.settings.particle_spacing)
-            }
-            DerivativeFrame::Initial => 0.0,
-        };
+        let velocity_max = self.velocity_max();
+        let time_step = self.time_step(velocity_max).unwrap_or(self.settings.time_step);
         let reorder = self.clock.step.is_multiple_of(STEPS_BETWEEN_SORTS);
-        self.frame.search(&self.settings, &mut self.particles, skin, reorder);
+        self.frame.search(&self.settings, &mut self.particles, Travel { time_step, velocity_max }, reorder);
         self.prepared = true;
     }
 

@@ -151,7 +151,7 @@ impl<const D: usize> VisitMut<Correction<D>> for Corrections<'_, D> {
             for k in 0..D {
                 let weight = slope * r_ij[k];
                 for l in 0..=k {
-                    alpha[k][l] += weight * r_ij[l];
+                    alpha[k][l] = alpha[k][l].plus_product(weight, r_ij[l]);
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! The operators on disordered particles: exact for linear fields, consistent for quadratic ones, in 2-D and 3-D.
 
-use alsph::frame::Frame;
+use alsph::frame::{Frame, Travel};
 use alsph::kernel::{Kernel, QuinticSpline, Smoothing, WendlandC2, WendlandC4};
 use alsph::lanes::{LANES, Portable};
 use alsph::neighbours::{Cluster, brute_force_neighbours};
@@ -31,7 +31,7 @@ impl<const D: usize> Set<D> {
 
     fn of(mut particles: Particles<D>, settings: &Settings, reorder: bool) -> Self {
         let mut frame = Frame::default();
-        frame.search(settings, &mut particles, 0.0, reorder);
+        frame.search(settings, &mut particles, Travel::default(), reorder);
         Self { particles, frame }
     }
 

@@ -286,6 +286,7 @@ def test_as_much_leaves_as_enters(small):
     entered, left = (history[name][-1] for name in ("mass_in", "mass_out"))
     assert entered == pytest.approx(3 * small.height, rel=0.05)
     assert left == pytest.approx(entered, rel=0.05)
+    # At first whole columns of 32 particles of the lattice enter and leave at once, now one first, now the other.
     fluid = history["fluid"].astype(float)
     assert np.abs(fluid / fluid[0] - 1).max() < 0.03
 

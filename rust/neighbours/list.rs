@@ -156,13 +156,20 @@ pub struct NeighbourList {
 }
 
 impl NeighbourList {
-    /// List for every cluster of real particles all within `radius` of one of them. The slopes are left blank.
-    pub fn search<const D: usize>(&mut self, particles: &Particles<D>, grid: &Grid<D>, radius: f64) {
+    /// List for every cluster of real particles all that lie within `radius` of one of them, or will when they are at the
+    /// positions `expected`. `grid` must reach all of these. The slopes are left blank.
+    pub fn search<const D: usize>(
+        &mut self,
+        particles: &Particles<D>,
+        expected: Option<&[Vector<D>]>,
+        grid: &Grid<D>,
+        radius: f64,
+    ) {
         let real = particles.real;
         self.chunks.resize_with(real.div_ceil(CHUNK), Chunk::default);
         self.chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
             let start = c * CHUNK;
-            run(Search { chunk, start, count: CHUNK.min(real - start), particles, grid, radius });
+            run(Search { chunk, start, count: CHUNK.min(real - start), particles, expected, grid, radius });
         });
     }
 
@@ -234,6 +241,7 @@ struct Search<'a, const D: usize> {
     start: usize,
     count: usize,
     particles: &'a Particles<D>,
+    expected: Option<&'a [Vector<D>]>,
     grid: &'a Grid<D>,
     radius: f64,
 }
@@ -249,7 +257,30 @@ impl<const D: usize> Task for Search<'_, D> {
         for offset in (0..self.count).step_by(LANES) {
             let cluster = Cluster { first: self.start + offset, count: LANES.min(self.count - offset) };
             let start = entries.len() as u32;
-            let near = find::<V, D>(cluster, &self.particles.position, self.grid, self.radius, near);
+            let here: [V; D] = cluster.vectors(&self.particles.position);
+            let limit = V::splat(self.radius * self.radius);
+            let points = cluster.particles().map(|i| self.particles.position[i]);
+            let near = if let Some(expected) = self.expected {
+                let there: [V; D] = cluster.vectors(expected);
+                find(
+                    &points,
+                    self.grid,
+                    near,
+                    #[inline(always)]
+                    |j, position| {
+                        let (now, then) = (norm_squared(from(here, &position)), norm_squared(from(there, &expected[j])));
+                        now.least(then).any_below(limit)
+                    },
+                )
+            } else {
+                find(
+                    &points,
+                    self.grid,
+                    near,
+                    #[inline(always)]
+                    |_, position| norm_squared(from(here, &position)).any_below(limit),
+                )
+            };
             if near.iter().any(solid) {
                 entries.extend(near.iter().filter(|j| !solid(j)).map(blank));
                 starts.push([start, entries.len() as u32]);
@@ -263,20 +294,18 @@ impl<const D: usize> Task for Search<'_, D> {
     }
 }
 
-/// The indices of all within `radius` of a particle of the cluster, collected at the front of `near`, which only ever grows.
+/// The indices of all that may lie around `points` and for which `counts(j, position of j)` holds, collected at the front of
+/// `near`, which only ever grows.
 #[inline(always)]
-fn find<'a, V: Lanes, const D: usize>(
-    cluster: Cluster,
-    position: &[Vector<D>],
+fn find<'a, const D: usize>(
+    points: &[Vector<D>; LANES],
     grid: &Grid<D>,
-    radius: f64,
     near: &'a mut Vec<u32>,
+    counts: impl Fn(usize, Vector<D>) -> bool,
 ) -> &'a [u32] {
-    let here: [V; D] = cluster.vectors(position);
-    let limit = V::splat(radius * radius);
     let mut count = 0;
     grid.for_each_run(
-        &cluster.particles().map(|i| position[i]),
+        points,
         #[inline(always)]
         |run| {
             let length = run.indices.len();
@@ -286,10 +315,9 @@ fn find<'a, V: Lanes, const D: usize>(
             let (slots, coordinates) = (&mut near[count..][..length], run.coordinates.map(|x| &x[..length]));
             let mut found = 0;
             for (k, &j) in run.indices.iter().enumerate() {
-                let r_ij = from(here, &Vector::from_fn(|axis, _| coordinates[axis][k]));
                 // Every candidate is written, and the next one overwrites it unless it counts: a branch would be mispredicted.
                 slots[found] = j;
-                found += usize::from(norm_squared(r_ij).any_below(limit));
+                found += usize::from(counts(j as usize, Vector::from_fn(|axis, _| coordinates[axis][k])));
             }
             count += found;
         },
