@@ -168,7 +168,7 @@ impl<K: Kernel> Smoothing<K> {
 
     /// q² of a squared distance, q = r/h. Zero gives a small q instead.
     #[inline(always)]
-    fn ratio_squared<R: Real>(&self, square: R) -> R {
+    pub fn ratio_squared<R: Real>(&self, square: R) -> R {
         R::splat(SMALLEST).plus_product(square, R::splat(self.inverse_length * self.inverse_length))
     }
 
@@ -182,25 +182,16 @@ impl<K: Kernel> Smoothing<K> {
         [(s0 * y0, y0, w0), (s1 * y1, y1, w1)]
     }
 
-    /// W(r) and its slope (dW/dr) / r for two sets of squared distances, in single precision (the slopes are stored in it).
-    #[cfg(not(feature = "double-slopes"))]
+    /// w(q), and `factor` (dw/dq) / q, of q².
     #[inline(always)]
-    pub fn evaluate<V: Lanes>(&self, squares: [V; 2]) -> ([V; 2], [V; 2]) {
-        let q = V::join(self.ratio_squared(squares[0]), self.ratio_squared(squares[1])).sqrt();
-        let ([w0, w1], [s0, s1]) = (V::split(K::value(q)), V::split(K::derivative(q) / q));
-        let value = V::splat(self.factor);
-        let slope = V::splat(self.factor * self.inverse_length * self.inverse_length);
-        ([w0 * value, w1 * value], [s0 * slope, s1 * slope])
+    pub fn value_and_slope<R: Real>(ratio_squared: R, factor: f64) -> (R, R) {
+        let q = ratio_squared.sqrt();
+        (K::value(q), R::splat(factor) * K::derivative(q) / q)
     }
 
-    /// W(r) and its slope (dW/dr) / r for two sets of squared distances.
-    #[cfg(feature = "double-slopes")]
-    #[inline(always)]
-    pub fn evaluate<V: Lanes>(&self, squares: [V; 2]) -> ([V; 2], [V; 2]) {
-        let length = V::splat(1.0 / self.inverse_length);
-        let [first, second] = squares;
-        let (first, second) = (self.ratio_squared(first).sqrt() * length, self.ratio_squared(second).sqrt() * length);
-        ([self.value(first), self.value(second)], [self.slope(first), self.slope(second)])
+    /// What w(q) is to be multiplied with to give W(r), and (dw/dq) / q to give (dW/dr) / r.
+    pub fn factors(&self) -> (f64, f64) {
+        (self.factor, self.factor * self.inverse_length * self.inverse_length)
     }
 }
 

@@ -33,6 +33,8 @@ pub trait Lanes: Real {
 
     fn join(first: Self, second: Self) -> Self::Singles;
     fn split(singles: Self::Singles) -> [Self; 2];
+    fn load_singles(values: &[[f32; LANES]; 2]) -> Self::Singles;
+    fn store_singles(singles: Self::Singles) -> [[f32; LANES]; 2];
     fn load(values: &[f64; LANES]) -> Self;
     fn load_single(values: &[f32; LANES]) -> Self;
     fn store(self) -> [f64; LANES];
@@ -231,6 +233,16 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
+    fn load_singles(values: &[[f32; LANES]; 2]) -> PortableSingles {
+        PortableSingles(std::array::from_fn(|lane| values[lane / LANES][lane % LANES]))
+    }
+
+    #[inline(always)]
+    fn store_singles(singles: PortableSingles) -> [[f32; LANES]; 2] {
+        [0, LANES].map(|start| std::array::from_fn(|lane| singles.0[start + lane]))
+    }
+
+    #[inline(always)]
     fn load(values: &[f64; LANES]) -> Self {
         Self(*values)
     }
@@ -346,6 +358,18 @@ mod avx2 {
         }
 
         #[inline(always)]
+        fn load_singles(values: &[[f32; LANES]; 2]) -> Singles {
+            Singles(unsafe { _mm256_loadu_ps(values.as_ptr().cast()) })
+        }
+
+        #[inline(always)]
+        fn store_singles(singles: Singles) -> [[f32; LANES]; 2] {
+            let mut values = [[0.0; LANES]; 2];
+            unsafe { _mm256_storeu_ps(values.as_mut_ptr().cast(), singles.0) };
+            values
+        }
+
+        #[inline(always)]
         fn load(values: &[f64; LANES]) -> Self {
             Self(unsafe { _mm256_loadu_pd(values.as_ptr()) })
         }
@@ -420,7 +444,7 @@ mod tests {
             let (a, b) = (V::load(&self.a), V::load(&self.b));
             let mut sum = a;
             sum += V::load_single(&b.store_single());
-            let singles = V::join(a, b);
+            let singles = V::load_singles(&V::store_singles(V::join(a, b)));
             let [third, _] = V::split(singles.plus_product(singles, singles.positive()));
             let [first, second] =
                 V::split(singles * singles.positive().sqrt() + V::Singles::splat(0.1) - V::Singles::splat(0.3) / singles);

@@ -1,7 +1,7 @@
 //! The stencil: all that the derivatives need to know of the particle positions of one frame. (14) (17)
 
 use crate::kernel::{Kernel, Smoothing};
-use crate::lanes::{Lanes, from, matrices, norm_squared};
+use crate::lanes::{LANES, Lanes, from, matrices, norm_squared};
 use crate::neighbours::{Cluster, Entry, NeighbourList, Row, Visit, VisitMut};
 use crate::operators::{Neighbourhood, Operator};
 use crate::parallel;
@@ -111,22 +111,34 @@ struct Volumes<'a, K, const D: usize> {
     nominal: f64,
 }
 
+/// Entries whose distances are found before their kernels.
+const BLOCK: usize = 32;
+
 impl<K: Kernel, const D: usize> VisitMut<f64> for Volumes<'_, K, D> {
     #[inline(always)]
     fn visit<V: Lanes>(&self, cluster: Cluster, entries: &mut [Entry], volume: &mut [f64]) {
         let here: [V; D] = cluster.vectors(self.position);
-        let nominal = V::splat(self.nominal);
+        let (value_factor, slope_factor) = self.kernel.factors();
+        let slope_factor = slope_factor * self.nominal;
         let mut sum = V::zero();
-        for two in entries.chunks_mut(2) {
-            // An odd last entry stands twice, the second time unused.
-            let [first, second] = [two[0].j(), two[two.len() - 1].j()].map(|j| &self.position[j]);
-            let (values, slopes) = self.kernel.evaluate([norm_squared(from(here, first)), norm_squared(from(here, second))]);
-            for ((entry, value), slope) in two.iter_mut().zip(values).zip(slopes) {
-                sum += value;
-                entry.set_slopes(slope * nominal);
+        // Distances in double precision, kernels in single, eight at a time.
+        let mut squares = [[0.0; LANES]; BLOCK];
+        for block in entries.chunks_mut(BLOCK) {
+            for (square, entry) in squares.iter_mut().zip(&*block) {
+                let r_ij = from(here, &self.position[entry.j()]);
+                *square = self.kernel.ratio_squared(norm_squared(r_ij)).store_single();
+            }
+            for (two, squares) in block.chunks_mut(2).zip(squares.as_chunks().0) {
+                // An odd last entry comes with the square of another, not used.
+                let (values, slopes) = Smoothing::<K>::value_and_slope(V::load_singles(squares), slope_factor);
+                let (values, slopes) = (V::split(values), V::store_singles(slopes));
+                for (k, entry) in two.iter_mut().enumerate() {
+                    sum += values[k];
+                    entry.slopes = slopes[k];
+                }
             }
         }
-        let sum = sum.store();
+        let sum = (sum * V::splat(value_factor)).store();
         volume.iter_mut().zip(sum).for_each(|(volume, sum)| *volume = 1.0 / sum);
     }
 }

@@ -10,18 +10,12 @@ use std::ops::Range;
 
 const _: () = assert!(CHUNK.is_multiple_of(LANES));
 
-/// Type of the one number stored a pair.
-#[cfg(not(feature = "double-slopes"))]
-type Slope = f32;
-#[cfg(feature = "double-slopes")]
-type Slope = f64;
-
 /// A neighbour j of one or more particles i of a cluster.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Entry {
     /// V_j (dW/dr)/r for each i, so that V_j ∇_i W_ij = slope · r_ij. Never positive, and zero beyond the support.
-    slopes: [Slope; LANES],
+    pub slopes: [f32; LANES],
     index: u32,
 }
 
@@ -36,28 +30,14 @@ impl Entry {
         f64::from(self.slopes[lane])
     }
 
-    #[cfg(not(feature = "double-slopes"))]
     #[inline(always)]
     pub fn slopes<V: Lanes>(&self) -> V {
         V::load_single(&self.slopes)
     }
 
-    #[cfg(not(feature = "double-slopes"))]
     #[inline(always)]
     pub fn set_slopes<V: Lanes>(&mut self, slopes: V) {
         self.slopes = slopes.store_single();
-    }
-
-    #[cfg(feature = "double-slopes")]
-    #[inline(always)]
-    pub fn slopes<V: Lanes>(&self) -> V {
-        V::load(&self.slopes)
-    }
-
-    #[cfg(feature = "double-slopes")]
-    #[inline(always)]
-    pub fn set_slopes<V: Lanes>(&mut self, slopes: V) {
-        self.slopes = slopes.store();
     }
 }
 
