@@ -10,26 +10,27 @@ use crate::settings::{Settings, Shifting};
 use crate::with_kernel;
 
 /// Displace the fluid particles towards an even spacing and carry velocity and pressure along to first order.
-/// `particles` stand at r^{n+1}; the derivatives are those of `frame`.
+/// `particles` stand at r^{n+1}; the derivatives are those of `frame`. `change` is what the particles were last changed by, kept
+/// so that its memory is used again.
 pub fn shift<const D: usize>(
     settings: &Settings,
     particles: &mut Particles<D>,
     frame: &Frame<D>,
     time_step: f64,
     velocity_max: f64,
+    change: &mut Vec<Change<D>>,
 ) {
     if settings.shifting == Shifting::None {
         return;
     }
-    let mut change = vec![(Vector::zeros(), Vector::zeros(), 0.0); particles.real];
+    let none = (Vector::zeros(), Vector::zeros(), 0.0);
+    change.resize(particles.real, none);
     with_kernel!(settings.kernel, K => {
         let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
         let operator = Displacement { settings, kernel, particles, time_step, velocity_max };
         let kind = &particles.kind;
-        frame.stencil.for_each_one(operator, &mut change, |i, value, change| {
-            if kind[i] == ParticleKind::Fluid {
-                *change = value;
-            }
+        frame.stencil.for_each_one(operator, change, |i, value, change| {
+            *change = if kind[i] == ParticleKind::Fluid { value } else { none };
         });
     });
     let Particles { real, position, velocity, pressure, .. } = particles;
@@ -39,7 +40,7 @@ pub fn shift<const D: usize>(
 }
 
 /// δr, δr·∇u and δr·∇p.
-type Change<const D: usize> = (Vector<D>, Vector<D>, f64);
+pub type Change<const D: usize> = (Vector<D>, Vector<D>, f64);
 
 /// Displacement of every particle if it were fluid.
 struct Displacement<'a, K, const D: usize> {

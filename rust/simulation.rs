@@ -12,7 +12,7 @@ use crate::particles::{Matrix, ParticleKind, Particles, Vector};
 use crate::report::{Clock, Report};
 use crate::scheme::{Alsph, Step};
 use crate::settings::{Boundary, Settings};
-use crate::shifting::shift;
+use crate::shifting::{Change, shift};
 use rayon::ThreadPool;
 use std::ops::Range;
 use std::sync::Arc;
@@ -31,6 +31,7 @@ pub struct Simulation<const D: usize> {
     frame: Frame<D>,
     walls: Walls<D>,
     scheme: Alsph<D>,
+    change: Vec<Change<D>>,
     largest_eigenvalue: f64,
     /// Whether `frame` belongs to the present positions.
     prepared: bool,
@@ -61,6 +62,7 @@ impl<const D: usize> Simulation<D> {
             clock,
             frame: Frame::default(),
             scheme: Alsph::default(),
+            change: Vec::new(),
             prepared: false,
             history: Vec::new(),
             pool: Arc::new(pool),
@@ -134,7 +136,7 @@ impl<const D: usize> Simulation<D> {
         let loads = loads(step.settings, &self.particles, &self.frame, &self.walls);
         let mut report = Report::new(step, outcome, &self.particles, &self.frame.stencil.volume, velocity_max, loads);
         self.scheme.advance_positions(step, &mut self.particles, &self.frame); // (12)
-        shift(step.settings, &mut self.particles, &self.frame, time_step, velocity_max); // (18) (19)
+        shift(step.settings, &mut self.particles, &self.frame, time_step, velocity_max, &mut self.change); // (18) (19)
         self.end_step(time_step);
         report.clock = self.clock;
         report.counts = self.particles.counts();

@@ -182,7 +182,7 @@ fn shift_is_that_of_plain_sums() {
     }
     let before = set.particles.clone();
     let time_step = 1e-4;
-    shift(&settings, &mut set.particles, &set.frame, time_step, 1.0);
+    shift(&settings, &mut set.particles, &set.frame, time_step, 1.0, &mut Vec::new());
     let smoothing = Smoothing::<QuinticSpline>::new(settings.smoothing_length(), 2);
     let near = brute_force_neighbours(&in_frame, before.real, settings.support_radius());
     let mut moved = 0;

@@ -1,6 +1,8 @@
 //! Cells at least half as wide as the search radius; points are listed by cell with a counting sort.
 
+use crate::parallel;
 use crate::particles::Vector;
+use std::ops::Range;
 
 /// Cells that the search radius reaches to either side: narrow cells fit the sphere closer than wide ones.
 const REACH: usize = 2;
@@ -52,7 +54,11 @@ impl<const D: usize> Grid<D> {
             *self = Self::default();
             return;
         };
-        let (lower, upper) = points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
+        let corners = |range: Range<usize>| {
+            points[range].iter().fold((first, first), |(low, high), point| (low.inf(point), high.sup(point)))
+        };
+        let (lower, upper) =
+            parallel::reduce(points.len(), corners, |a, b| (a.0.inf(&b.0), a.1.sup(&b.1))).unwrap_or((first, first));
         let (lower, upper) = (lower.sup(&bounds.0), upper.inf(&bounds.1));
         self.origin = lower;
         // A hair wider, so that rounding cannot put a neighbour one cell farther away.
@@ -71,17 +77,15 @@ impl<const D: usize> Grid<D> {
     fn counting_sort(&mut self, points: &[Vector<D>]) {
         self.starts.clear();
         self.starts.resize(self.cells.iter().product::<usize>() + 1, 0);
-        self.cell_of.clear();
-        for point in points {
-            let cell = self.flat(self.cell(point));
-            self.cell_of.push(cell as u32);
-            self.starts[cell + 1] += 1;
-        }
+        let mut cell_of = std::mem::take(&mut self.cell_of);
+        cell_of.resize(points.len(), 0);
+        parallel::for_each(&mut cell_of, |i, cell| *cell = self.flat(self.cell(&points[i])) as u32);
+        cell_of.iter().for_each(|&cell| self.starts[cell as usize + 1] += 1);
         for cell in 1..self.starts.len() {
             self.starts[cell] += self.starts[cell - 1];
         }
         self.items.resize(points.len(), 0);
-        for (index, &cell) in self.cell_of.iter().enumerate() {
+        for (index, &cell) in cell_of.iter().enumerate() {
             let slot = &mut self.starts[cell as usize];
             self.items[*slot as usize] = index as u32;
             *slot += 1;
@@ -90,9 +94,10 @@ impl<const D: usize> Grid<D> {
         self.starts.rotate_right(1);
         self.starts[0] = 0;
         for (axis, coordinates) in self.coordinates.iter_mut().enumerate() {
-            coordinates.clear();
-            coordinates.extend(self.items.iter().map(|&item| points[item as usize][axis]));
+            coordinates.resize(points.len(), 0.0);
+            parallel::for_each(coordinates, |k, x| *x = points[self.items[k] as usize][axis]);
         }
+        self.cell_of = cell_of;
     }
 
     /// Point indices sorted by cell, then by index.

@@ -8,6 +8,9 @@ use crate::particles::{ParticleKind, Particles, Vector};
 use rayon::prelude::*;
 use std::ops::Range;
 
+/// Most chunks in a task, so that a thread that falls behind leaves little to wait for.
+const TASK: usize = 8;
+
 const _: () = assert!(CHUNK.is_multiple_of(LANES));
 
 /// A neighbour j of one or more particles i of a cluster.
@@ -147,7 +150,7 @@ impl NeighbourList {
     ) {
         let real = particles.real;
         self.chunks.resize_with(real.div_ceil(CHUNK), Chunk::default);
-        self.chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
+        self.chunks.par_iter_mut().enumerate().with_max_len(TASK).for_each(|(c, chunk)| {
             let start = c * CHUNK;
             run(Search { chunk, start, count: CHUNK.min(real - start), particles, expected, grid, radius });
         });
@@ -170,7 +173,7 @@ impl NeighbourList {
         }
 
         let outputs = a.par_chunks_mut(CHUNK).zip(b.par_chunks_mut(CHUNK));
-        self.chunks.par_iter().zip(outputs).enumerate().for_each(|(c, (chunk, (a, b)))| {
+        self.chunks.par_iter().zip(outputs).enumerate().with_max_len(TASK).for_each(|(c, (chunk, (a, b)))| {
             run(Pass(chunk, c * CHUNK, a, b, &visitor));
         });
     }
@@ -192,7 +195,7 @@ impl NeighbourList {
         }
 
         let outputs = out.par_chunks_mut(CHUNK);
-        self.chunks.par_iter_mut().zip(outputs).enumerate().for_each(|(c, (chunk, out))| {
+        self.chunks.par_iter_mut().zip(outputs).enumerate().with_max_len(TASK).for_each(|(c, (chunk, out))| {
             run(Pass(chunk, c * CHUNK, out, &visitor));
         });
     }
