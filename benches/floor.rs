@@ -154,6 +154,7 @@ fn main() {
     let mut particles = lattice::particles::<2>(SIDE);
     let mut frame = Frame::default();
     frame.search(&settings, &mut particles, Travel::default(), true);
+    frame.stencil.correct();
     let (stencil, count) = (&frame.stencil, particles.real);
     let pairs = stencil.neighbours.pair_count(&particles, settings.support_radius()) as f64;
     let entries = stencil.neighbours.entry_count() as f64;

@@ -3,19 +3,26 @@
 //! Every operator sums weights times differences, so a constant field has derivatives of exactly zero, and corrects the sum
 //! with the tensor made of the same weights, so a linear field has its exact gradient.
 
-use crate::lanes::{LANES, Lanes, add_product, from, matrices, vectors};
-use crate::neighbours::{Cluster, Entry, Row};
+use crate::lanes::{LANES, Lanes, add_product, matrices, vectors};
+use crate::neighbours::{Cluster, Entry};
 use crate::particles::{Matrix, Vector};
 use crate::stencil::{Correction, Stencil};
 
-/// What the operators read of a cluster and its neighbours.
-#[derive(Clone, Copy)]
-pub struct Neighbourhood<'a, const D: usize> {
-    pub cluster: Cluster,
-    pub row: Row<'a>,
-    /// Positions of the frame.
-    pub position: &'a [Vector<D>],
-    pub correction: &'a [Correction<D>],
+/// A cluster and its neighbours as an operator sees them. It must go over every neighbour once, then ask for the corrections.
+pub trait Neighbours<V: Lanes, const D: usize> {
+    fn cluster(&self) -> Cluster;
+
+    /// Call `add(j, slope, r_ij)` for each neighbour.
+    fn for_each(&mut self, add: impl FnMut(usize, V, [V; D]));
+
+    /// Call `add(j, slope, r_ij)` for each fluid or buffer neighbour.
+    fn for_each_flowing(&mut self, add: impl FnMut(usize, V, [V; D]));
+
+    /// Call `add(s, slope, r_is)` for each solid neighbour.
+    fn for_each_solid(&mut self, add: impl FnMut(usize, V, [V; D]));
+
+    /// The correction of each lane.
+    fn corrections(&mut self) -> [Correction<D>; LANES];
 }
 
 /// A quantity formed from the neighbours of every particle.
@@ -23,8 +30,11 @@ pub trait Operator<const D: usize>: Sync {
     type Value;
 
     /// The value at the particle of each lane. Mark `#[inline(always)]`, see [`crate::lanes::Task`].
-    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [Self::Value; LANES];
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [Self::Value; LANES];
 }
+
+/// Nothing, for what a pass over the neighbours does beside its operator.
+pub struct Nothing;
 
 /// ∇f. (15)
 pub struct Gradient<'a>(pub &'a [f64]);
@@ -44,20 +54,17 @@ pub struct LaplacianAndDivergence<'a, const D: usize, F> {
     pub seen: F,
 }
 
-impl<const D: usize> Neighbourhood<'_, D> {
-    /// Call `add(j, slope, r_ij)` for each of `entries`.
-    #[inline(always)]
-    pub fn for_each<V: Lanes>(&self, entries: &[Entry], mut add: impl FnMut(usize, V, [V; D])) {
-        let here: [V; D] = self.cluster.vectors(self.position);
-        for entry in entries {
-            add(entry.j(), entry.slopes(), from(here, &self.position[entry.j()]));
-        }
-    }
+impl<const D: usize> Operator<D> for Nothing {
+    type Value = ();
 
-    /// The correction of each lane.
     #[inline(always)]
-    pub fn corrections(&self) -> [&Correction<D>; LANES] {
-        self.cluster.particles().map(|i| &self.correction[i])
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [(); LANES] {
+        near.for_each(
+            #[inline(always)]
+            |_, _, _| (),
+        );
+        near.corrections();
+        [(); LANES]
     }
 }
 
@@ -65,18 +72,17 @@ impl<const D: usize> Operator<D> for Gradient<'_> {
     type Value = Vector<D>;
 
     #[inline(always)]
-    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [Vector<D>; LANES] {
-        let here: V = near.cluster.lanes(|i| self.0[i]);
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [Vector<D>; LANES] {
+        let here: V = near.cluster().lanes(|i| self.0[i]);
         let mut gradient = [V::zero(); D];
         near.for_each(
-            near.row.all(),
             #[inline(always)]
             |j, slope: V, r_ij| {
                 let difference = (V::splat(self.0[j]) - here) * slope;
                 add_product(&mut gradient, difference, r_ij);
             },
         );
-        corrected(near, gradient)
+        corrected(gradient, &near.corrections())
     }
 }
 
@@ -84,8 +90,8 @@ impl<const D: usize> Operator<D> for VelocityGradient<'_, D> {
     type Value = Matrix<D>;
 
     #[inline(always)]
-    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [Matrix<D>; LANES] {
-        let (tensor, corrections) = (matrices(uncorrected_gradient::<V, D>(near, self.0)), near.corrections());
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [Matrix<D>; LANES] {
+        let (tensor, corrections) = (matrices(uncorrected_gradient(near, self.0)), near.corrections());
         // α is symmetric.
         std::array::from_fn(|lane| tensor[lane] * corrections[lane].inverse)
     }
@@ -95,8 +101,9 @@ impl<const D: usize> Operator<D> for Divergence<'_, D> {
     type Value = f64;
 
     #[inline(always)]
-    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [f64; LANES] {
-        corrected_trace(near, uncorrected_gradient::<V, D>(near, self.0))
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [f64; LANES] {
+        let tensor = uncorrected_gradient(near, self.0);
+        corrected_trace(tensor, &near.corrections())
     }
 }
 
@@ -104,11 +111,10 @@ impl<const D: usize> Operator<D> for GradientAndLaplacian<'_> {
     type Value = (Vector<D>, f64);
 
     #[inline(always)]
-    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [(Vector<D>, f64); LANES] {
-        let here: [V; 2] = [near.cluster.lanes(|i| self.0[i][0]), near.cluster.lanes(|i| self.0[i][1])];
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [(Vector<D>, f64); LANES] {
+        let here: [V; 2] = [near.cluster().lanes(|i| self.0[i][0]), near.cluster().lanes(|i| self.0[i][1])];
         let (mut gradient, mut laplacian) = ([V::zero(); D], V::zero());
         near.for_each(
-            near.row.all(),
             #[inline(always)]
             |j, slope: V, r_ij| {
                 let [f, g] = self.0[j];
@@ -116,7 +122,8 @@ impl<const D: usize> Operator<D> for GradientAndLaplacian<'_> {
                 laplacian = laplacian.plus_product(V::splat(g) - here[1], slope);
             },
         );
-        let (gradient, laplacian, corrections) = (corrected(near, gradient), laplacian.store(), near.corrections());
+        let corrections = near.corrections();
+        let (gradient, laplacian) = (corrected(gradient, &corrections), laplacian.store());
         std::array::from_fn(|lane| (gradient[lane], corrections[lane].laplacian * laplacian[lane]))
     }
 }
@@ -125,12 +132,12 @@ impl<const D: usize, F: Fn(usize, usize) -> Vector<D> + Sync> Operator<D> for La
     type Value = (Vector<D>, f64);
 
     #[inline(always)]
-    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [(Vector<D>, f64); LANES] {
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [(Vector<D>, f64); LANES] {
         let velocity = self.velocity;
-        let here: [V; D] = near.cluster.vectors(velocity);
+        let cluster = near.cluster();
+        let here: [V; D] = cluster.vectors(velocity);
         let (mut laplacian, mut tensor) = ([V::zero(); D], [[V::zero(); D]; D]);
-        near.for_each(
-            near.row.flowing(),
+        near.for_each_flowing(
             #[inline(always)]
             |j, slope: V, r_ij| {
                 for k in 0..D {
@@ -140,18 +147,18 @@ impl<const D: usize, F: Fn(usize, usize) -> Vector<D> + Sync> Operator<D> for La
                 }
             },
         );
-        near.for_each(
-            near.row.solid(),
+        near.for_each_solid(
             #[inline(always)]
             |s, slope: V, r_ij| {
-                let seen = near.cluster.particles().map(|i| (self.seen)(s, i));
+                let seen = cluster.particles().map(|i| (self.seen)(s, i));
                 for k in 0..D {
                     laplacian[k] = laplacian[k].plus_product(V::load(&seen.map(|u| u[k])) - here[k], slope);
                     add_product(&mut tensor[k], (V::splat(velocity[s][k]) - here[k]) * slope, r_ij);
                 }
             },
         );
-        let (laplacian, divergence, corrections) = (vectors(laplacian), corrected_trace(near, tensor), near.corrections());
+        let corrections = near.corrections();
+        let (laplacian, divergence) = (vectors(laplacian), corrected_trace(tensor, &corrections));
         std::array::from_fn(|lane| (laplacian[lane] * corrections[lane].laplacian, divergence[lane]))
     }
 }
@@ -179,11 +186,10 @@ pub fn vector_laplacian<const D: usize>(
 
 /// Σ slope (u_j − u_i) r_ijᵀ: ∇u before its correction.
 #[inline(always)]
-fn uncorrected_gradient<V: Lanes, const D: usize>(near: Neighbourhood<D>, field: &[Vector<D>]) -> [[V; D]; D] {
-    let here: [V; D] = near.cluster.vectors(field);
+fn uncorrected_gradient<V: Lanes, const D: usize>(near: &mut impl Neighbours<V, D>, field: &[Vector<D>]) -> [[V; D]; D] {
+    let here: [V; D] = near.cluster().vectors(field);
     let mut tensor = [[V::zero(); D]; D];
     near.for_each(
-        near.row.all(),
         #[inline(always)]
         |j, slope: V, r_ij| {
             for k in 0..D {
@@ -196,14 +202,14 @@ fn uncorrected_gradient<V: Lanes, const D: usize>(near: Neighbourhood<D>, field:
 
 /// α⁻¹ times a vector.
 #[inline(always)]
-fn corrected<V: Lanes, const D: usize>(near: Neighbourhood<D>, sum: [V; D]) -> [Vector<D>; LANES] {
-    let (sum, corrections) = (vectors(sum), near.corrections());
+fn corrected<V: Lanes, const D: usize>(sum: [V; D], corrections: &[Correction<D>; LANES]) -> [Vector<D>; LANES] {
+    let sum = vectors(sum);
     std::array::from_fn(|lane| corrections[lane].inverse * sum[lane])
 }
 
 /// Σ_kl α⁻¹_kl T_kl.
 #[inline(always)]
-fn corrected_trace<V: Lanes, const D: usize>(near: Neighbourhood<D>, tensor: [[V; D]; D]) -> [f64; LANES] {
-    let (tensor, corrections) = (matrices(tensor), near.corrections());
+fn corrected_trace<V: Lanes, const D: usize>(tensor: [[V; D]; D], corrections: &[Correction<D>; LANES]) -> [f64; LANES] {
+    let tensor = matrices(tensor);
     std::array::from_fn(|lane| tensor[lane].component_mul(&corrections[lane].inverse).sum())
 }

@@ -2,11 +2,13 @@
 
 use crate::frame::Frame;
 use crate::kernel::{Kernel, Smoothing};
-use crate::lanes::{LANES, Lanes, add_product, from, matrices, norm_squared, vectors};
-use crate::operators::{Neighbourhood, Operator};
+use crate::lanes::{Lanes, add_product, from, matrices, norm_squared, vectors};
+use crate::neighbours::{Cluster, Row, Visit};
+use crate::operators::Neighbours;
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{Settings, Shifting};
+use crate::stencil::{Corrected, Stencil};
 use crate::with_kernel;
 
 /// Displace the fluid particles towards an even spacing and carry velocity and pressure along to first order.
@@ -27,11 +29,9 @@ pub fn shift<const D: usize>(
     change.resize(particles.real, none);
     with_kernel!(settings.kernel, K => {
         let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
-        let operator = Displacement { settings, kernel, particles, time_step, velocity_max };
-        let kind = &particles.kind;
-        frame.stencil.for_each_one(operator, change, |i, value, change| {
-            *change = if kind[i] == ParticleKind::Fluid { value } else { none };
-        });
+        let stencil = &frame.stencil;
+        let displacement = Displacement { settings, kernel, particles, stencil, time_step, velocity_max };
+        stencil.neighbours.for_each(change, &mut vec![(); particles.real], displacement);
     });
     let Particles { real, position, velocity, pressure, .. } = particles;
     parallel::for_each(&mut position[..*real], |i, r| *r += change[i].0);
@@ -47,23 +47,22 @@ struct Displacement<'a, K, const D: usize> {
     settings: &'a Settings,
     kernel: Smoothing<K>,
     particles: &'a Particles<D>,
+    stencil: &'a Stencil<D>,
     time_step: f64,
     velocity_max: f64,
 }
 
-impl<K: Kernel, const D: usize> Operator<D> for Displacement<'_, K, D> {
-    type Value = Change<D>;
-
+impl<K: Kernel, const D: usize> Visit<Change<D>, ()> for Displacement<'_, K, D> {
     #[inline(always)]
-    fn apply<V: Lanes>(&self, near: Neighbourhood<D>) -> [Change<D>; LANES] {
-        let Surroundings { asymmetry, relative, total, distances, count } = self.surroundings::<V>(near);
+    fn visit<V: Lanes>(&self, cluster: Cluster, row: Row<'_>, out: &mut [Change<D>], _: &mut [()]) {
+        let Surroundings { asymmetry, relative, total, distances, count } = self.surroundings::<V>(cluster, row);
         let (asymmetry, relative) = (vectors(asymmetry), vectors(relative));
         let (total, distances, count) = (total.store(), distances.store(), count.store());
-        let Particles { velocity, pressure, .. } = self.particles;
-        let (u, p): ([V; D], V) = (near.cluster.vectors(velocity), near.cluster.lanes(|i| pressure[i]));
+        let Particles { velocity, pressure, kind, .. } = self.particles;
+        let (u, p): ([V; D], V) = (cluster.vectors(velocity), cluster.lanes(|i| pressure[i]));
         let (mut velocity_gradient, mut pressure_gradient) = ([[V::zero(); D]; D], [V::zero(); D]);
-        near.for_each(
-            near.row.all(),
+        let Stencil { position, correction, .. } = self.stencil;
+        Corrected { cluster, row, position, correction }.for_each(
             #[inline(always)]
             |j, slope: V, r_ij| {
                 for k in 0..D {
@@ -73,16 +72,20 @@ impl<K: Kernel, const D: usize> Operator<D> for Displacement<'_, K, D> {
             },
         );
         let (velocity_gradient, pressure_gradient) = (matrices(velocity_gradient), vectors(pressure_gradient));
-        let corrections = near.corrections();
-        std::array::from_fn(|lane| {
+        for (lane, out) in out.iter_mut().enumerate() {
+            let i = cluster.first + lane;
+            if kind[i] != ParticleKind::Fluid {
+                *out = (Vector::zeros(), Vector::zeros(), 0.0);
+                continue;
+            }
             // The particle itself is in the list: it is counted, and adds next to nothing to the other sums.
             let others = count[lane] - 1.0;
             let mean_distance = if others > 0.0 { distances[lane] / others } else { 0.0 };
             let relative_speed = relative[lane].norm() / total[lane];
             let shift = self.limited(asymmetry[lane], mean_distance, relative_speed);
-            let carried = corrections[lane].inverse * shift;
-            (shift, velocity_gradient[lane] * carried, pressure_gradient[lane].dot(&carried))
-        })
+            let carried = correction[i].inverse * shift;
+            *out = (shift, velocity_gradient[lane] * carried, pressure_gradient[lane].dot(&carried));
+        }
     }
 }
 
@@ -102,15 +105,16 @@ impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
     /// At r^{n+1}, over the neighbours in the frame of the last derivatives. The distances in double precision: the rounding of
     /// single would break the symmetry of a symmetric flow within a few steps.
     #[inline(always)]
-    fn surroundings<V: Lanes>(&self, near: Neighbourhood<D>) -> Surroundings<V, D> {
+    fn surroundings<V: Lanes>(&self, cluster: Cluster, row: Row<'_>) -> Surroundings<V, D> {
+        let in_frame = &self.stencil.position;
         let Particles { position, velocity, .. } = self.particles;
-        let here: [V; D] = near.cluster.vectors(position);
-        let here_in_frame: [V; D] = near.cluster.vectors(near.position);
-        let u: [V; D] = near.cluster.vectors(velocity);
+        let here: [V; D] = cluster.vectors(position);
+        let here_in_frame: [V; D] = cluster.vectors(in_frame);
+        let u: [V; D] = cluster.vectors(velocity);
         let limit = V::splat(self.settings.neighbour_distance().powi(2));
         let (mut asymmetry, mut relative) = ([V::zero(); D], [V::zero(); D]);
         let (mut total, mut distances, mut count) = (V::zero(), V::zero(), V::zero());
-        for two in near.row.all().chunks(2) {
+        for two in row.all().chunks(2) {
             // An odd last entry stands twice, the second time unused.
             let two_j = [two[0].j(), two[two.len() - 1].j()];
             let r = [from(here, &position[two_j[0]]), from(here, &position[two_j[1]])];
@@ -118,7 +122,7 @@ impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
             for k in 0..two.len() {
                 let (j, r_ij, (q, inverse, value)) = (two_j[k], r[k], ratios[k]);
                 // The row also holds particles beyond the support of this lane, which must not count.
-                let inside = norm_squared(from(here_in_frame, &near.position[j])).below(limit);
+                let inside = norm_squared(from(here_in_frame, &in_frame[j])).below(limit);
                 add_product(&mut asymmetry, inside * inverse * (inverse * inverse), r_ij);
                 distances = distances.plus_product(inside, q);
                 count += inside;

@@ -228,6 +228,7 @@ impl<const D: usize> Simulation<D> {
     pub fn snapshot(&mut self) -> Snapshot<D> {
         self.on_pool(|simulation| {
             simulation.prepare();
+            simulation.frame.stencil.correct();
             let particles = &simulation.particles;
             let mut gradient = vec![Matrix::zeros(); particles.real];
             let operator = VelocityGradient(&particles.velocity);

@@ -2,12 +2,13 @@
 
 use crate::kernel::{Kernel, Smoothing};
 use crate::lanes::{LANES, Lanes, from, matrices, norm_squared};
-use crate::neighbours::{Cluster, Entry, NeighbourList, Row, Visit, VisitMut};
-use crate::operators::{Neighbourhood, Operator};
+use crate::neighbours::{Cluster, Entry, NeighbourList, Row, RowMut, Visit, VisitMut};
+use crate::operators::{Neighbours, Nothing, Operator};
 use crate::parallel;
 use crate::particles::{Matrix, Particles, Vector};
 use crate::settings::Settings;
 use crate::with_kernel;
+use std::ops::Range;
 
 /// Inverse correction tensors with a larger norm are taken for singular: too few neighbours for a gradient.
 const SINGULAR: f64 = 1e3;
@@ -21,6 +22,10 @@ pub struct Stencil<const D: usize> {
     pub volume: Vec<f64>,
     /// Correction of the real particles.
     pub correction: Vec<Correction<D>>,
+    /// Whether the corrections belong to the positions.
+    corrected: bool,
+    /// The volume in the slopes before they are corrected.
+    nominal: f64,
 }
 
 /// What the sums over a particle's neighbours are corrected with.
@@ -33,7 +38,8 @@ pub struct Correction<const D: usize> {
 }
 
 impl<const D: usize> Stencil<D> {
-    /// Volumes, slopes and corrections at the present positions. `mirror` copies the volumes of real particles to their images.
+    /// Volumes, slopes and, later, corrections at the present positions. `mirror` copies the volumes of real particles to their
+    /// images.
     pub fn evaluate(&mut self, settings: &Settings, particles: &Particles<D>, mirror: impl Fn(&mut [f64])) {
         self.position.resize(particles.len(), Vector::zeros());
         parallel::for_each(&mut self.position, |i, position| *position = particles.position[i]);
@@ -42,12 +48,36 @@ impl<const D: usize> Stencil<D> {
         let (position, real) = (&self.position, particles.real);
         // The slopes first hold the nominal volume Δx^D in the place of V_j, lest f32 overflow in small units.
         let nominal = settings.particle_spacing.powi(D as i32);
+        let outputs = (&mut self.volume[..real], &mut nothing(real)[..], &mut nothing(real)[..]);
         with_kernel!(settings.kernel, K => {
             let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
-            self.neighbours.for_each_mut(&mut self.volume[..real], Volumes { kernel, position, nominal });
+            self.neighbours.for_each_mut(outputs, Volumes { kernel, position, nominal });
         });
         mirror(&mut self.volume);
-        self.neighbours.for_each_mut(&mut self.correction, Corrections { position, volume: &self.volume, nominal });
+        self.nominal = nominal;
+        self.corrected = false;
+    }
+
+    /// Bring the corrections up to date, if no pass has done so on its way.
+    pub fn correct(&mut self) {
+        let real = self.correction.len();
+        self.correct_and_for_each(Nothing, &mut nothing(real), &mut nothing(real), |_, (), (), ()| ());
+    }
+
+    /// [`Stencil::for_each`], which also brings the corrections up to date on its way: the first pass after `evaluate`.
+    pub fn correct_and_for_each<O: Operator<D>, A: Send, B: Send>(
+        &mut self,
+        operator: O,
+        a: &mut [A],
+        b: &mut [B],
+        f: impl Fn(usize, O::Value, &mut A, &mut B) + Sync,
+    ) {
+        if self.corrected {
+            return self.for_each(operator, a, b, f);
+        }
+        let Self { neighbours, position, volume, correction, nominal, .. } = self;
+        neighbours.for_each_mut((correction, a, b), CorrectAndApply { operator, position, volume, nominal: *nominal, f });
+        self.corrected = true;
     }
 
     /// `f(i, value of the operator at i, &mut a[i], &mut b[i])` for every real particle, in parallel.
@@ -58,6 +88,7 @@ impl<const D: usize> Stencil<D> {
         b: &mut [B],
         f: impl Fn(usize, O::Value, &mut A, &mut B) + Sync,
     ) {
+        assert!(self.corrected, "the corrections are of another frame");
         let Self { position, correction, .. } = self;
         self.neighbours.for_each(a, b, Apply { operator, position, correction, f });
     }
@@ -69,15 +100,65 @@ impl<const D: usize> Stencil<D> {
         out: &mut [A],
         f: impl Fn(usize, O::Value, &mut A) + Sync,
     ) {
-        // A vector of () takes no memory.
-        let mut nothing = vec![(); out.len()];
+        let count = out.len();
         self.for_each(
             operator,
             out,
-            &mut nothing,
+            &mut nothing(count),
             #[inline(always)]
             |i, value, out, ()| f(i, value, out),
         );
+    }
+}
+
+/// Outputs for those who have none: a vector of () takes no memory.
+fn nothing(count: usize) -> Vec<()> {
+    vec![(); count]
+}
+
+/// A cluster whose corrections are known.
+#[derive(Clone, Copy)]
+pub struct Corrected<'a, const D: usize> {
+    pub cluster: Cluster,
+    pub row: Row<'a>,
+    pub position: &'a [Vector<D>],
+    pub correction: &'a [Correction<D>],
+}
+
+impl<const D: usize> Corrected<'_, D> {
+    #[inline(always)]
+    fn each<V: Lanes>(&self, entries: &[Entry], mut add: impl FnMut(usize, V, [V; D])) {
+        let here: [V; D] = self.cluster.vectors(self.position);
+        for entry in entries {
+            add(entry.j(), entry.slopes(), from(here, &self.position[entry.j()]));
+        }
+    }
+}
+
+impl<V: Lanes, const D: usize> Neighbours<V, D> for Corrected<'_, D> {
+    #[inline(always)]
+    fn cluster(&self) -> Cluster {
+        self.cluster
+    }
+
+    #[inline(always)]
+    fn for_each_flowing(&mut self, add: impl FnMut(usize, V, [V; D])) {
+        self.each(self.row.flowing(), add);
+    }
+
+    #[inline(always)]
+    fn for_each_solid(&mut self, add: impl FnMut(usize, V, [V; D])) {
+        self.each(self.row.solid(), add);
+    }
+
+    #[inline(always)]
+    fn for_each(&mut self, add: impl FnMut(usize, V, [V; D])) {
+        self.each(self.row.all(), add);
+    }
+
+    #[inline(always)]
+    fn corrections(&mut self) -> [Correction<D>; LANES] {
+        self.cluster.particles().map(|i| self.correction[i])
     }
 }
 
@@ -96,8 +177,8 @@ where
 {
     #[inline(always)]
     fn visit<V: Lanes>(&self, cluster: Cluster, row: Row<'_>, a: &mut [A], b: &mut [B]) {
-        let near = Neighbourhood { cluster, row, position: self.position, correction: self.correction };
-        let values = self.operator.apply::<V>(near);
+        let mut near = Corrected { cluster, row, position: self.position, correction: self.correction };
+        let values = self.operator.apply::<V>(&mut near);
         for (lane, ((value, a), b)) in values.into_iter().zip(a).zip(b).enumerate() {
             (self.f)(cluster.first + lane, value, a, b);
         }
@@ -114,16 +195,16 @@ struct Volumes<'a, K, const D: usize> {
 /// Entries whose distances are found before their kernels.
 const BLOCK: usize = 32;
 
-impl<K: Kernel, const D: usize> VisitMut<f64> for Volumes<'_, K, D> {
+impl<K: Kernel, const D: usize> VisitMut<f64, (), ()> for Volumes<'_, K, D> {
     #[inline(always)]
-    fn visit<V: Lanes>(&self, cluster: Cluster, entries: &mut [Entry], volume: &mut [f64]) {
+    fn visit<V: Lanes>(&self, cluster: Cluster, row: RowMut<'_>, (volume, ..): (&mut [f64], &mut [()], &mut [()])) {
         let here: [V; D] = cluster.vectors(self.position);
         let (value_factor, slope_factor) = self.kernel.factors();
         let slope_factor = slope_factor * self.nominal;
         let mut sum = V::zero();
         // Distances in double precision, kernels in single, eight at a time.
         let mut squares = [[0.0; LANES]; BLOCK];
-        for block in entries.chunks_mut(BLOCK) {
+        for block in row.entries.chunks_mut(BLOCK) {
             for (square, entry) in squares.iter_mut().zip(&*block) {
                 let r_ij = from(here, &self.position[entry.j()]);
                 *square = self.kernel.ratio_squared(norm_squared(r_ij)).store_single();
@@ -143,20 +224,26 @@ impl<K: Kernel, const D: usize> VisitMut<f64> for Volumes<'_, K, D> {
     }
 }
 
-/// V_j into the slopes, and the correction tensor (17) from the slopes as stored.
-struct Corrections<'a, const D: usize> {
+/// A cluster whose corrections are formed while an operator goes over its neighbours.
+struct Correcting<'a, V, const D: usize> {
+    cluster: Cluster,
+    row: RowMut<'a>,
     position: &'a [Vector<D>],
     volume: &'a [f64],
     nominal: f64,
+    /// −α of the neighbours so far, its lower triangle.
+    alpha: [[V; D]; D],
+    correction: &'a mut [Correction<D>],
 }
 
-impl<const D: usize> VisitMut<Correction<D>> for Corrections<'_, D> {
+impl<V: Lanes, const D: usize> Correcting<'_, V, D> {
+    /// V_j into the slopes, and the correction tensor (17) from the slopes as stored.
     #[inline(always)]
-    fn visit<V: Lanes>(&self, cluster: Cluster, entries: &mut [Entry], correction: &mut [Correction<D>]) {
-        let here: [V; D] = cluster.vectors(self.position);
+    fn each(&mut self, range: Range<usize>, mut add: impl FnMut(usize, V, [V; D])) {
+        let here: [V; D] = self.cluster.vectors(self.position);
         let inverse = 1.0 / self.nominal;
-        let mut alpha = [[V::zero(); D]; D];
-        for entry in entries {
+        let mut alpha = self.alpha;
+        for entry in &mut self.row.entries[range] {
             let j = entry.j();
             entry.set_slopes(entry.slopes::<V>() * V::splat(self.volume[j] * inverse));
             let (slope, r_ij) = (entry.slopes::<V>(), from(here, &self.position[j]));
@@ -166,10 +253,70 @@ impl<const D: usize> VisitMut<Correction<D>> for Corrections<'_, D> {
                     alpha[k][l] = alpha[k][l].plus_product(weight, r_ij[l]);
                 }
             }
+            add(j, slope, r_ij);
         }
-        for (correction, mut alpha) in correction.iter_mut().zip(matrices(alpha)) {
-            alpha.fill_upper_triangle_with_lower_triangle();
-            *correction = Correction::of(&-alpha);
+        self.alpha = alpha;
+    }
+}
+
+impl<V: Lanes, const D: usize> Neighbours<V, D> for Correcting<'_, V, D> {
+    #[inline(always)]
+    fn cluster(&self) -> Cluster {
+        self.cluster
+    }
+
+    #[inline(always)]
+    fn for_each_flowing(&mut self, add: impl FnMut(usize, V, [V; D])) {
+        self.each(0..self.row.flowing, add);
+    }
+
+    #[inline(always)]
+    fn for_each_solid(&mut self, add: impl FnMut(usize, V, [V; D])) {
+        self.each(self.row.flowing..self.row.entries.len(), add);
+    }
+
+    #[inline(always)]
+    fn for_each(&mut self, add: impl FnMut(usize, V, [V; D])) {
+        self.each(0..self.row.entries.len(), add);
+    }
+
+    #[inline(always)]
+    fn corrections(&mut self) -> [Correction<D>; LANES] {
+        let mut alpha = matrices(self.alpha);
+        alpha.iter_mut().for_each(|alpha| alpha.fill_upper_triangle_with_lower_triangle());
+        let corrections = alpha.map(|alpha| Correction::of(&-alpha));
+        self.correction.iter_mut().zip(corrections).for_each(|(out, correction)| *out = correction);
+        corrections
+    }
+}
+
+/// [`Apply`] to clusters whose corrections are yet to be formed.
+struct CorrectAndApply<'a, O, F, const D: usize> {
+    operator: O,
+    position: &'a [Vector<D>],
+    volume: &'a [f64],
+    nominal: f64,
+    f: F,
+}
+
+impl<O, F, A, B, const D: usize> VisitMut<Correction<D>, A, B> for CorrectAndApply<'_, O, F, D>
+where
+    O: Operator<D>,
+    F: Fn(usize, O::Value, &mut A, &mut B) + Sync,
+{
+    #[inline(always)]
+    fn visit<V: Lanes>(
+        &self,
+        cluster: Cluster,
+        row: RowMut<'_>,
+        (correction, a, b): (&mut [Correction<D>], &mut [A], &mut [B]),
+    ) {
+        let Self { position, volume, nominal, .. } = *self;
+        let alpha = [[V::zero(); D]; D];
+        let mut near = Correcting { cluster, row, position, volume, nominal, alpha, correction };
+        let values = self.operator.apply::<V>(&mut near);
+        for (lane, ((value, a), b)) in values.into_iter().zip(a).zip(b).enumerate() {
+            (self.f)(cluster.first + lane, value, a, b);
         }
     }
 }

@@ -5,11 +5,11 @@ use alsph::kernel::{Kernel, QuinticSpline, Smoothing, WendlandC2, WendlandC4};
 use alsph::lanes::{LANES, Portable};
 use alsph::neighbours::{Cluster, brute_force_neighbours};
 use alsph::operators::{
-    Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, Neighbourhood, Operator, VelocityGradient,
-    vector_laplacian,
+    Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, Operator, VelocityGradient, vector_laplacian,
 };
 use alsph::settings::Settings;
 use alsph::shifting::shift;
+use alsph::stencil::Corrected;
 use alsph::{ParticleKind, Particles, Vector};
 use approx::assert_relative_eq;
 use proptest::prelude::*;
@@ -32,6 +32,7 @@ impl<const D: usize> Set<D> {
     fn of(mut particles: Particles<D>, settings: &Settings, reorder: bool) -> Self {
         let mut frame = Frame::default();
         frame.search(settings, &mut particles, Travel::default(), reorder);
+        frame.stencil.correct();
         Self { particles, frame }
     }
 
@@ -127,10 +128,26 @@ fn portable_lanes_give_the_bits_of_the_machines() {
     for first in (0..set.particles.real).step_by(LANES) {
         let cluster = Cluster { first, count: LANES.min(set.particles.real - first) };
         let (row, _) = stencil.neighbours.row(first);
-        let near = Neighbourhood { cluster, row, position: &stencil.position, correction: &stencil.correction };
-        let portable = operator().apply::<Portable>(near);
+        let mut near = Corrected { cluster, row, position: &stencil.position, correction: &stencil.correction };
+        let portable = operator().apply::<Portable>(&mut near);
         assert_eq!(values[first..first + cluster.count], portable[..cluster.count]);
     }
+}
+
+/// Corrections formed in the pass of an operator are those of a pass of their own, and so are the operator's values.
+#[test]
+fn corrections_on_the_way_change_no_bit() {
+    let settings = common::settings::<3>(1.0 / 9.0, "none");
+    let mut set = Set::<3>::new(9, 0.3, &settings);
+    let velocity = set.field(|x| Vector::from([x[0] * x[1], x[2].sin(), x[0] - x[1]]));
+    let operator = || LaplacianAndDivergence { velocity: &velocity, seen: |s: usize, _: usize| velocity[s] };
+    let expected = set.apply(operator());
+    set.frame.update(&settings, &set.particles);
+    let mut values = vec![None; set.particles.real];
+    let mut nothing = vec![(); set.particles.real];
+    set.frame.stencil.correct_and_for_each(operator(), &mut values, &mut nothing, |_, value, out, ()| *out = Some(value));
+    assert_eq!(values.into_iter().flatten().collect::<Vec<_>>(), expected);
+    assert_eq!(set.apply(operator()), expected);
 }
 
 /// Volumes and slopes against plain sums in double precision.

@@ -69,6 +69,14 @@ impl<'a> Row<'a> {
     }
 }
 
+/// A row to be changed.
+#[derive(Debug)]
+pub struct RowMut<'a> {
+    pub entries: &'a mut [Entry],
+    /// Number of flowing neighbours, which come first.
+    pub flowing: usize,
+}
+
 /// Up to four particles that follow each other in the arrays.
 #[derive(Clone, Copy, Debug)]
 pub struct Cluster {
@@ -107,8 +115,8 @@ pub trait Visit<A, B>: Sync {
 }
 
 /// Work that changes the rows.
-pub trait VisitMut<A>: Sync {
-    fn visit<V: Lanes>(&self, cluster: Cluster, entries: &mut [Entry], a: &mut [A]);
+pub trait VisitMut<A, B, C>: Sync {
+    fn visit<V: Lanes>(&self, cluster: Cluster, row: RowMut<'_>, outputs: (&mut [A], &mut [B], &mut [C]));
 }
 
 #[derive(Debug, Default)]
@@ -130,6 +138,12 @@ impl Chunk {
     fn row(&self, row: usize) -> Row<'_> {
         let [start, solid] = self.starts[row];
         Row { entries: &self.entries[self.range(row)], flowing: (solid - start) as usize }
+    }
+
+    #[inline(always)]
+    fn row_mut(&mut self, row: usize) -> RowMut<'_> {
+        let ([start, solid], range) = (self.starts[row], self.range(row));
+        RowMut { entries: &mut self.entries[range], flowing: (solid - start) as usize }
     }
 }
 
@@ -179,24 +193,28 @@ impl NeighbourList {
     }
 
     /// Visit every cluster in parallel and change its row.
-    pub fn for_each_mut<A: Send>(&mut self, out: &mut [A], visitor: impl VisitMut<A>) {
-        struct Pass<'a, A, W>(&'a mut Chunk, usize, &'a mut [A], &'a W);
+    pub fn for_each_mut<A: Send, B: Send, C: Send>(
+        &mut self,
+        (a, b, c): (&mut [A], &mut [B], &mut [C]),
+        visitor: impl VisitMut<A, B, C>,
+    ) {
+        struct Pass<'a, A, B, C, W>(&'a mut Chunk, usize, (&'a mut [A], &'a mut [B], &'a mut [C]), &'a W);
 
-        impl<A, W: VisitMut<A>> Task for Pass<'_, A, W> {
+        impl<A, B, C, W: VisitMut<A, B, C>> Task for Pass<'_, A, B, C, W> {
             #[inline(always)]
             fn run<V: Lanes>(self) {
-                let Self(chunk, start, out, visitor) = self;
-                for (row, out) in out.chunks_mut(LANES).enumerate() {
-                    let cluster = Cluster { first: start + row * LANES, count: out.len() };
-                    let range = chunk.range(row);
-                    visitor.visit::<V>(cluster, &mut chunk.entries[range], out);
+                let Self(chunk, start, (a, b, c), visitor) = self;
+                let outputs = a.chunks_mut(LANES).zip(b.chunks_mut(LANES)).zip(c.chunks_mut(LANES));
+                for (row, ((a, b), c)) in outputs.enumerate() {
+                    let cluster = Cluster { first: start + row * LANES, count: a.len() };
+                    visitor.visit::<V>(cluster, chunk.row_mut(row), (a, b, c));
                 }
             }
         }
 
-        let outputs = out.par_chunks_mut(CHUNK);
-        self.chunks.par_iter_mut().zip(outputs).enumerate().with_max_len(TASK).for_each(|(c, (chunk, out))| {
-            run(Pass(chunk, c * CHUNK, out, &visitor));
+        let outputs = a.par_chunks_mut(CHUNK).zip(b.par_chunks_mut(CHUNK)).zip(c.par_chunks_mut(CHUNK));
+        self.chunks.par_iter_mut().zip(outputs).enumerate().with_max_len(TASK).for_each(|(k, (chunk, ((a, b), c)))| {
+            run(Pass(chunk, k * CHUNK, (a, b, c), &visitor));
         });
     }
 

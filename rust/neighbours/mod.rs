@@ -6,4 +6,4 @@ mod list;
 
 pub use brute_force::brute_force_neighbours;
 pub use grid::Grid;
-pub use list::{Cluster, Entry, NeighbourList, Row, Visit, VisitMut};
+pub use list::{Cluster, Entry, NeighbourList, Row, RowMut, Visit, VisitMut};

@@ -91,25 +91,27 @@ impl<const D: usize> Alsph<D> {
         self.pressure_laplacian.resize(real, 0.0);
     }
 
-    /// ∇·u^m and ∇²u^m, and p^m beside ∇·u^m.
-    fn velocity_derivatives(&mut self, step: Step, particles: &Particles<D>, frame: &Frame<D>, walls: &mut Walls<D>) {
+    /// ∇·u^m and ∇²u^m, and p^m beside ∇·u^m: the first pass over a frame, so it forms the corrections too.
+    fn velocity_derivatives(&mut self, step: Step, particles: &Particles<D>, frame: &mut Frame<D>, walls: &mut Walls<D>) {
         extrapolate_wall_velocity(step.settings, particles, frame, walls);
         let real = particles.real;
         let (velocity, pressure) = (&particles.velocity, &particles.pressure);
         let walls = &*walls;
         let seen = |s, i| walls.seen_by(particles, s, i);
-        frame.stencil.for_each(
+        frame.stencil.correct_and_for_each(
             LaplacianAndDivergence { velocity, seen },
             &mut self.divergence_pressure[..real],
             &mut self.velocity_laplacian,
             |i, (component_form, divergence), out, laplacian| {
                 *out = [divergence, pressure[i]];
-                *laplacian = match step.settings.velocity_laplacian {
-                    VelocityLaplacian::Scalar => component_form,
-                    VelocityLaplacian::Vector => vector_laplacian(&frame.stencil, velocity, i, |s| seen(s, i)),
-                };
+                *laplacian = component_form;
             },
         );
+        if step.settings.velocity_laplacian == VelocityLaplacian::Vector {
+            parallel::for_each(&mut self.velocity_laplacian, |i, laplacian| {
+                *laplacian = vector_laplacian(&frame.stencil, velocity, i, |s| seen(s, i));
+            });
+        }
         frame.images.scalars(&mut self.divergence_pressure);
     }
 
