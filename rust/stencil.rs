@@ -282,10 +282,17 @@ impl<V: Lanes, const D: usize> Neighbours<V, D> for Correcting<'_, V, D> {
 
     #[inline(always)]
     fn corrections(&mut self) -> [Correction<D>; LANES] {
-        let mut alpha = matrices(self.alpha);
-        alpha.iter_mut().for_each(|alpha| alpha.fill_upper_triangle_with_lower_triangle());
-        let corrections = alpha.map(|alpha| Correction::of(&-alpha));
-        self.correction.iter_mut().zip(corrections).for_each(|(out, correction)| *out = correction);
+        for k in 0..D {
+            for l in 0..k {
+                self.alpha[l][k] = self.alpha[k][l];
+            }
+        }
+        let alpha = matrices(self.alpha);
+        let corrections = std::array::from_fn(
+            #[inline(always)]
+            |lane| Correction::of(&-alpha[lane]),
+        );
+        self.correction.copy_from_slice(&corrections[..self.correction.len()]);
         corrections
     }
 }
@@ -325,7 +332,7 @@ impl<const D: usize> Correction<D> {
     #[inline(always)]
     fn of(alpha: &Matrix<D>) -> Self {
         let inverse = match alpha.try_inverse() {
-            Some(inverse) if inverse.norm() < SINGULAR => inverse,
+            Some(inverse) if inverse.norm_squared() < SINGULAR * SINGULAR => inverse,
             _ => Matrix::identity(),
         };
         Self { inverse, laplacian: -2.0 * (D as f64 + 2.0) / (2.0 + alpha.trace()) }
