@@ -1,13 +1,16 @@
 //! What this machine can do, beside what the engine makes of it: memory bandwidth, arithmetic rate, and a pair loop written by
-//! hand, measured in the same run as the engine's passes over the same particles, on one thread.
+//! hand, measured in the same run as the engine's passes over the same particles, on one thread. All take turns, and what counts
+//! is the median of each one's time over that of the loop by hand, because other work on the machine slows both.
 //!
-//! `cargo bench --bench floor`
+//! `cargo bench --bench floor -- --save` keeps these ratios, and `cargo bench --bench floor` compares with those kept: so see
+//! whether a change made the engine slower.
 
 use alsph::frame::{Frame, Travel};
 use alsph::lanes::{LANES, Lanes, Task, run};
-use alsph::neighbours::Entry;
+use alsph::neighbours::{Entry, Grid, NeighbourList};
 use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence};
-use alsph::{Particles, Vector};
+use alsph::{Clock, Particles, Simulation, Vector};
+use std::collections::HashMap;
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -16,18 +19,26 @@ mod lattice;
 /// Particles a side, about as many in all as the paper's channel has at D/Δx = 20.
 const SIDE: usize = 277;
 
-/// Rounds, of which the fastest counts: other work on the machine only ever slows one down.
-const ROUNDS: usize = 30;
+/// Turns that each measurement takes.
+const ROUNDS: usize = 25;
 
-/// Seconds of the fastest of a number of rounds.
+/// Where the ratios are kept.
+const SAVED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/target/floor.json");
+
+fn seconds(work: &mut dyn FnMut()) -> f64 {
+    let start = Instant::now();
+    work();
+    start.elapsed().as_secs_f64()
+}
+
+/// Seconds of the fastest of all rounds: other work on the machine only ever slows one down.
 fn fastest(mut work: impl FnMut()) -> f64 {
-    (0..ROUNDS)
-        .map(|_| {
-            let start = Instant::now();
-            work();
-            start.elapsed().as_secs_f64()
-        })
-        .fold(f64::INFINITY, f64::min)
+    (0..ROUNDS).map(|_| seconds(&mut work)).fold(f64::INFINITY, f64::min)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
 }
 
 /// Sum an array: as fast as memory gives it.
@@ -126,38 +137,41 @@ fn machine() -> Machine {
     Machine { bandwidth: size_of_val(&values[..]) as f64 / read, arithmetic: (2 * LANES * times) as f64 / compute }
 }
 
-/// Seconds of the pair loop by hand over the rows of `frame`, but for a last row of fewer than four.
-fn by_hand(frame: &Frame<2>, particles: &Particles<2>, field: &[f64]) -> f64 {
+/// The rows of `frame` for the pair loop by hand, but for a last row of fewer than four.
+fn rows_by_hand(frame: &Frame<2>, particles: &Particles<2>) -> (Vec<std::ops::Range<usize>>, Vec<Near>) {
     let (mut rows, mut near) = (Vec::new(), Vec::new());
     for first in (0..particles.real - LANES + 1).step_by(LANES) {
         let start = near.len();
         let (row, _) = frame.stencil.neighbours.row(first);
-        near.extend(
-            row.all()
-                .iter()
-                .map(|entry| Near { slopes: std::array::from_fn(|lane| entry.slope(lane) as f32), j: entry.j() as u32 }),
-        );
+        near.extend(row.all().iter().map(|entry| Near { slopes: entry.slopes, j: entry.j() as u32 }));
         rows.push(start..near.len());
     }
-    let mut out = vec![[[0.0; LANES]; 2]; rows.len()];
-    let seconds = fastest(|| {
-        run(ByHand { rows: &rows, near: &near, position: &particles.position, field, out: &mut out });
-    });
-    black_box(&out);
-    seconds
+    (rows, near)
+}
+
+/// One thing to time.
+struct Measurement<'a> {
+    name: &'static str,
+    /// Passes over all pairs, if it is not a single one.
+    passes: f64,
+    /// Additions, subtractions and multiplications a lane of one entry, and f64 numbers a particle beside the entries; none for
+    /// whole steps.
+    operations: f64,
+    numbers: usize,
+    work: Box<dyn FnMut() + 'a>,
 }
 
 fn main() {
-    // Arguments that cargo passes are of no use here.
+    let save = std::env::args().any(|argument| argument == "--save");
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("no pool was made before");
     let settings = lattice::settings::<2>(SIDE, "initial");
     let mut particles = lattice::particles::<2>(SIDE);
     let mut frame = Frame::default();
     frame.search(&settings, &mut particles, Travel::default(), true);
     frame.stencil.correct();
-    let (stencil, count) = (&frame.stencil, particles.real);
-    let pairs = stencil.neighbours.pair_count(&particles, settings.support_radius()) as f64;
-    let entries = stencil.neighbours.entry_count() as f64;
+    let count = particles.real;
+    let pairs = frame.stencil.neighbours.pair_count(&particles, settings.support_radius()) as f64;
+    let entries = frame.stencil.neighbours.entry_count() as f64;
     let machine = machine();
     println!(
         "{count} particles, {:.1} neighbours each, {:.2} lanes a pair, one thread",
@@ -166,41 +180,143 @@ fn main() {
     );
     println!("memory bandwidth   {:6.1} GB/s, reading 256 MiB", machine.bandwidth / 1e9);
     println!("arithmetic         {:6.1} GFLOP/s, f64 multiplications and additions, not fused", machine.arithmetic / 1e9);
-    println!();
-    println!("{:28} {:>8} {:>12} {:>8} {:>8} {:>10}", "pass", "ns/pair", "pairs/s", "memory", "compute", "by hand");
 
+    let (rows, near) = rows_by_hand(&frame, &particles);
     let velocity = &particles.velocity;
     let scalar: Vec<f64> = velocity.iter().map(|u| u[0]).collect();
     let both: Vec<[f64; 2]> = velocity.iter().map(|u| [u[0], u[1]]).collect();
-    let (mut vectors, mut scalars) = (vec![Vector::<2>::zeros(); count], vec![0.0; count]);
-    let hand = by_hand(&frame, &particles, &scalar);
-    // Operations a lane of one entry: additions, subtractions and multiplications of the loop.
-    let report = |name: &str, seconds: f64, operations: f64, fields: usize| {
-        let bytes = entries * size_of::<Entry>() as f64 + (fields * size_of::<f64>() * count) as f64;
-        let memory = bytes / machine.bandwidth / seconds;
-        let compute = operations * LANES as f64 * entries / machine.arithmetic / seconds;
+    let stencil = &frame.stencil;
+    let zeros = || (vec![Vector::<2>::zeros(); count], vec![0.0; count]);
+    let mut out = vec![[[0.0; LANES]; 2]; rows.len()];
+    let (mut gradients, mut divergences) = zeros();
+    let ((mut laplacians, mut traces), (mut slopes, mut curvatures)) = (zeros(), zeros());
+    let (mut grid, mut list) = (Grid::default(), NeighbourList::default());
+    let mut again = Frame::default();
+    again.search(&settings, &mut particles.clone(), Travel::default(), false);
+    let mut simulations = ["updated", "initial"].map(|derivatives| {
+        let settings = lattice::settings::<2>(SIDE, derivatives);
+        let mut simulation = Simulation::new(settings, lattice::particles::<2>(SIDE), Clock::default(), Some(1))
+            .expect("the particles of the bench are valid");
+        simulation.advance(2, None).expect("the vortex is stable");
+        simulation
+    });
+    let [updated, initial] = &mut simulations;
+    let pass = |name, operations, numbers, work| Measurement { name, passes: 1.0, operations, numbers, work };
+    let mut measurements = [
+        pass(
+            "by hand: uncorrected gradient",
+            8.0,
+            5,
+            Box::new(|| {
+                run(ByHand { rows: &rows, near: &near, position: &particles.position, field: &scalar, out: &mut out })
+            }),
+        ),
+        pass(
+            "gradient",
+            8.0,
+            10,
+            Box::new(|| stencil.for_each_one(Gradient(&scalar), &mut gradients, |_, value, out| *out = value)),
+        ),
+        pass(
+            "divergence",
+            14.0,
+            10,
+            Box::new(|| stencil.for_each_one(Divergence(velocity), &mut divergences, |_, value, out| *out = value)),
+        ),
+        pass(
+            "Laplacian and divergence",
+            16.0,
+            12,
+            Box::new(|| {
+                let operator = LaplacianAndDivergence { velocity, seen: |s: usize, _: usize| velocity[s] };
+                stencil.for_each(operator, &mut laplacians, &mut traces, |_, value, l, d| (*l, *d) = value);
+            }),
+        ),
+        pass(
+            "gradient and Laplacian",
+            11.0,
+            12,
+            Box::new(|| {
+                stencil
+                    .for_each(GradientAndLaplacian(&both), &mut slopes, &mut curvatures, |_, value, g, l| (*g, *l) = value);
+            }),
+        ),
+        pass(
+            "grid and neighbour list",
+            0.0,
+            0,
+            Box::new(|| {
+                let radius = settings.neighbour_distance();
+                grid.build(&particles.position, radius, settings.bounds());
+                list.search(&particles, None, &grid, radius);
+            }),
+        ),
+        Measurement {
+            name: "volumes, corrections",
+            passes: 2.0,
+            operations: 0.0,
+            numbers: 0,
+            work: Box::new(|| {
+                again.stencil.evaluate(&settings, &particles, |volume| again.images.scalars(volume));
+                again.stencil.correct();
+            }),
+        },
+        Measurement {
+            name: "step, Algorithm 2",
+            passes: 24.0,
+            operations: 0.0,
+            numbers: 0,
+            work: Box::new(|| assert!(initial.advance(1, None).is_ok())),
+        },
+        Measurement {
+            name: "step, Algorithm 1",
+            passes: 29.0,
+            operations: 0.0,
+            numbers: 0,
+            work: Box::new(|| assert!(updated.advance(1, None).is_ok())),
+        },
+    ];
+    let mut times = vec![Vec::new(); measurements.len()];
+    for _ in 0..ROUNDS {
+        for (times, measurement) in times.iter_mut().zip(&mut measurements) {
+            times.push(seconds(&mut measurement.work));
+        }
+    }
+
+    let saved: HashMap<String, f64> =
+        std::fs::read_to_string(SAVED).ok().and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default();
+    let mut ratios = HashMap::new();
+    println!();
+    println!(
+        "{:30} {:>8} {:>12} {:>7} {:>8} {:>8} {:>8}",
+        "", "ns/pair", "pairs/s", "memory", "compute", "by hand", "saved"
+    );
+    for (measurement, measured) in measurements.iter().zip(&times) {
+        let fastest = measured.iter().copied().fold(f64::INFINITY, f64::min);
+        let ratio = median(measured.iter().zip(&times[0]).map(|(time, hand)| time / hand).collect()) / measurement.passes;
+        let bytes = entries * size_of::<Entry>() as f64 + (measurement.numbers * size_of::<f64>() * count) as f64;
+        let part = |of: f64| if measurement.operations > 0.0 { format!("{:.0}%", 100.0 * of) } else { String::new() };
         println!(
-            "{name:28} {:8.3} {:12.2e} {:7.0}% {:7.0}% {:9.2}x",
-            seconds / pairs * 1e9,
-            pairs / seconds,
-            100.0 * memory,
-            100.0 * compute,
-            seconds / hand
+            "{:30} {:8.3} {:12.2e} {:>7} {:>8} {:7.2}x {:>8}",
+            measurement.name,
+            fastest / (pairs * measurement.passes) * 1e9,
+            pairs * measurement.passes / fastest,
+            part(bytes / machine.bandwidth / fastest),
+            part(measurement.operations * LANES as f64 * entries / machine.arithmetic / fastest),
+            ratio,
+            saved.get(measurement.name).map_or(String::new(), |saved| format!("{:+.1}%", 100.0 * (ratio / saved - 1.0)))
         );
-    };
-    report("by hand: uncorrected gradient", hand, 8.0, 5);
-    let seconds = fastest(|| stencil.for_each_one(Gradient(&scalar), &mut vectors, |_, value, out| *out = value));
-    report("gradient", seconds, 8.0, 10);
-    let seconds = fastest(|| stencil.for_each_one(Divergence(velocity), &mut scalars, |_, value, out| *out = value));
-    report("divergence", seconds, 14.0, 10);
-    let seconds = fastest(|| {
-        let operator = LaplacianAndDivergence { velocity, seen: |s: usize, _: usize| velocity[s] };
-        stencil.for_each(operator, &mut vectors, &mut scalars, |_, value, l, d| (*l, *d) = value);
-    });
-    report("Laplacian and divergence", seconds, 16.0, 12);
-    let seconds = fastest(|| {
-        stencil.for_each(GradientAndLaplacian(&both), &mut vectors, &mut scalars, |_, value, g, l| (*g, *l) = value);
-    });
-    report("gradient and Laplacian", seconds, 11.0, 12);
-    black_box((&vectors, &scalars));
+        ratios.insert(measurement.name, ratio);
+    }
+    println!();
+    println!(
+        "ns, pairs/s: the fastest round, a directed pair and pass. by hand: the median of the time a pass over the loop by hand's."
+    );
+    if save {
+        let text = serde_json::to_string_pretty(&ratios).expect("numbers can be written");
+        std::fs::write(SAVED, text).expect("target/ can be written");
+        println!("kept in {SAVED}");
+    } else if !saved.is_empty() {
+        println!("saved: the change of by hand since --save.");
+    }
 }

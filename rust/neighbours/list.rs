@@ -292,6 +292,10 @@ impl<const D: usize> Task for Search<'_, D> {
             }
         }
         starts.push([entries.len() as u32; 2]);
+        // A vector that grew holds up to twice what it needs.
+        if entries.capacity() > entries.len() + entries.len() / 4 {
+            entries.shrink_to(entries.len() + entries.len() / 8);
+        }
     }
 }
 

@@ -1,0 +1,81 @@
+"""Time alsph as the peers are timed and print one line of JSON."""
+
+import argparse
+import json
+import time
+
+import alsph
+import numpy as np
+from scipy.spatial import cKDTree
+
+# Passes over all pairs in a step: volumes, the first pass (which forms the corrections too), four an iteration, two of
+# the shift. Algorithm 1 has volumes in every iteration.
+PASSES = {1: lambda iterations: 5 * iterations + 4, 2: lambda iterations: 4 * iterations + 4}
+
+
+def channel_pairs(case, position):
+    """Count the directed pairs of the channel's particles, images across the walls included."""
+    radius = 3 * case.smoothing_ratio / case.resolution * (1 + 5e-7)
+    plane = case.height / 2
+    images = [position]
+    for side in (-plane, plane):
+        near = np.abs(position[:, 1] - side) < radius
+        images.append(np.column_stack([position[near, 0], 2 * side - position[near, 1]]))
+    return cKDTree(position).count_neighbors(cKDTree(np.vstack(images)), radius)
+
+
+parser = argparse.ArgumentParser()
+parser.add_argument("case", choices=["cylinder", "taylor_green"])
+parser.add_argument("--resolution", type=int, default=20)
+parser.add_argument("--algorithm", type=int, default=2)
+parser.add_argument("--steps", type=int, default=20, help="steps to time, of the cylinder")
+parser.add_argument("--until", type=float, default=1.0, help="time to reach, of the vortex")
+options = parser.parse_args()
+
+WARM_UP = 5
+result = {"code": f"alsph, Algorithm {options.algorithm}"}
+cpu = []
+if options.case == "cylinder":
+    case = alsph.cases.Cylinder(reynolds=200, resolution=options.resolution, algorithm=options.algorithm)
+    simulation = case.simulation(threads=1)
+    for _ in range(WARM_UP + options.steps):
+        simulation.advance(1)
+        cpu.append(time.process_time())
+else:
+    case = alsph.cases.TaylorGreen(reynolds=100, resolution=options.resolution, algorithm=options.algorithm)
+    simulation = case.simulation(threads=1)
+    while simulation.time < options.until:
+        simulation.advance(1)
+        cpu.append(time.process_time())
+history, state = simulation.history(), simulation.snapshot()
+position = state["position"]
+if options.case == "cylinder":
+    count = channel_pairs(case, position)
+else:
+    radius = 3 * case.smoothing_ratio / case.resolution * (1 + 5e-7)
+    tree = cKDTree(position % 1, boxsize=1)
+    count = tree.count_neighbors(tree, radius)
+    rate = -8 * np.pi**2 / case.reynolds
+    factor = np.exp(rate * simulation.time)
+    x, y = (2 * np.pi * position).T
+    exact = factor * np.column_stack([-np.cos(x) * np.sin(y), np.sin(x) * np.cos(y)])
+    speed = np.linalg.norm(state["velocity"], axis=1)
+    result |= {
+        "decay_rate": -np.log(np.mean(speed**2) / 0.5) / simulation.time,
+        "decay_rate_exact": -2 * rate,
+        "velocity_error": float(np.mean(np.linalg.norm(state["velocity"] - exact, axis=1)) / factor),
+    }
+count -= len(position)
+iterations = history["iterations"][WARM_UP:]
+print(
+    json.dumps(
+        result
+        | {
+            "particles": len(position),
+            "neighbours": count / len(position),
+            "cpu_per_step": float(np.median(np.diff(cpu[WARM_UP - 1 :]))),
+            "time_step": float(np.mean(history["time_step"][WARM_UP:])),
+            "pair_passes_per_step": float(count * np.mean([PASSES[options.algorithm](m) for m in iterations])),
+        }
+    )
+)

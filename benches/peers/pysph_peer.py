@@ -1,0 +1,129 @@
+"""Time PySPH on alsph's cases and print one line of JSON. Runs in the environment that run.py makes."""
+
+import argparse
+import json
+import time
+
+import numpy as np
+from pysph.examples import flow_past_cylinder_2d, taylor_green
+from scipy.spatial import cKDTree
+
+
+class Clock:
+    """Notes the CPU time of every step."""
+
+    def __init__(self):
+        self.cpu, self.time = [], []
+
+    def tick(self, solver):
+        """Note the end of a step."""
+        self.cpu.append(time.process_time())
+        self.time.append(solver.t)
+
+
+class Cylinder(flow_past_cylinder_2d.WindTunnel):
+    """The channel of Kolukisa, Ozbulut and Yildiz (2021): 14 D long, 13 D high, cylinder 4 D from the inlet."""
+
+    def consume_user_options(self):
+        """Set the geometry, which the example's options only reach in part."""
+        super().consume_user_options()
+        self.Lt, self.Wt, self.cxy = 14 * self.dc, 6.5 * self.dc, (4 * self.dc, 0.0)
+
+    def post_step(self, solver):
+        """Note the end of a step."""
+        clock.tick(solver)
+
+
+class TaylorGreen(taylor_green.TaylorGreen):
+    """The example as it is."""
+
+    def post_step(self, solver):
+        """Note the end of a step."""
+        clock.tick(solver)
+
+
+def loops(evaluator):
+    """Return (destination, source, passes) of every loop over neighbours in one evaluation of the equations."""
+    counts = {}
+
+    def visit(group):
+        if group.has_subgroups:
+            for sub in group.data:
+                visit(sub)
+            return
+        for destination, (_, sources, _) in group.data.items():
+            for source, equations in sources.items():
+                if equations.has_loop() or equations.has_loop_all():
+                    pair = (destination, source)
+                    counts[pair] = counts.get(pair, 0) + max(1, group.min_iterations if group.iterate else 1)
+
+    for group in evaluator.mega_groups:
+        visit(group)
+    return counts
+
+
+def pairs(solver, destination, source, period):
+    """Count the pairs within the support radius."""
+    arrays = {array.name: array for array in solver.particles}
+    points = [np.column_stack([arrays[name].x, arrays[name].y]) for name in (destination, source)]
+    if not all(len(p) for p in points):
+        return 0
+    radius = solver.kernel.radius_scale * float(arrays[destination].h.max())
+    real = [p[arrays[name].tag == 0] for p, name in zip(points, (destination, source), strict=True)]
+    trees = [cKDTree(p % period if period else p, boxsize=period) for p in real]
+    return int(trees[0].count_neighbors(trees[1], radius * (1 - 1e-9)))
+
+
+def errors(fluid, time):
+    """Return the decay rate of the kinetic energy and the mean error of the velocity, of the Taylor-Green vortex."""
+    rate = -8 * np.pi**2 / 100
+    real = fluid.tag == 0
+    x, y, u, v = (getattr(fluid, name)[real] for name in "xyuv")
+    exact = taylor_green.exact_solution(1.0, rate, time, x, y)
+    energy = np.mean(u**2 + v**2) / np.mean(0.5)
+    return {
+        "decay_rate": -np.log(energy) / time,
+        "decay_rate_exact": -2 * rate,
+        "velocity_error": float(np.mean(np.hypot(u - exact[0], v - exact[1])) / np.exp(rate * time)),
+    }
+
+
+parser = argparse.ArgumentParser()
+parser.add_argument("case", choices=["cylinder", "taylor_green"])
+parser.add_argument("--resolution", type=int, default=20)
+parser.add_argument("--smoothing-ratio", type=float, default=4 / 3)
+parser.add_argument("--steps", type=int, default=20, help="steps to time, of the cylinder")
+parser.add_argument("--until", type=float, default=1.0, help="time to reach, of the vortex")
+parser.add_argument("--scheme", default="edac")
+parser.add_argument("--cache", action="store_true")
+parser.add_argument("--output", default="pysph_output")
+options = parser.parse_args()
+
+WARM_UP = 5
+clock = Clock()
+arguments = [f"--nx={options.resolution}", f"--hdx={options.smoothing_ratio}", f"--directory={options.output}"]
+if options.case == "taylor_green":
+    app = TaylorGreen()
+    arguments += [f"--scheme={options.scheme}", f"--tf={options.until}", "--pfreq=1000000"]
+else:
+    app = Cylinder()
+    arguments += [f"--max-steps={WARM_UP + options.steps}", "--disable-output"]
+if options.cache:
+    arguments.append("--cache-nnps")
+app.run(arguments)
+solver = app.solver
+unit, period = (app.dc, None) if options.case == "cylinder" else (1.0, 1.0)
+found = loops(solver.acceleration_evals[0])
+fluid = solver.particles[0]
+result = {
+    "code": f"PySPH {options.scheme.upper()}" + (", cached neighbours" if options.cache else ""),
+    "particles": sum(int(np.sum(array.tag == 0)) for array in solver.particles),
+    "smoothing_ratio": options.smoothing_ratio,
+    "neighbours": pairs(solver, "fluid", "fluid", period) / np.sum(fluid.tag == 0) - 1,
+    "cpu_per_step": float(np.median(np.diff(clock.cpu[WARM_UP - 1 :]))),
+    "time_step": float(np.mean(np.diff(clock.time[WARM_UP - 1 :]))) / unit,
+    "pair_passes_per_step": sum(count * pairs(solver, *pair, period) for pair, count in found.items()),
+}
+if options.case == "taylor_green":
+    result |= errors(fluid, solver.t)
+print(json.dumps(result))
