@@ -36,16 +36,18 @@ impl<const D: usize> Frame<D> {
     /// Create the images of the particles, search neighbours and evaluate the stencil. With `reorder` the particles are first
     /// put into cell order. If the derivatives will follow the particles, the list holds neighbours at r^n and at r^n + u^n Δt.
     pub fn search(&mut self, settings: &Settings, particles: &mut Particles<D>, travel: Travel, reorder: bool) {
-        let lasts = settings.derivative_frame == DerivativeFrame::Updated && !settings.search_every_iteration;
-        let distance = (travel.velocity_max * travel.time_step).min(settings.particle_spacing);
+        let follows = settings.derivative_frame == DerivativeFrame::Updated;
+        let lasts = follows && !settings.search_every_iteration;
+        let distance = if follows { (travel.velocity_max * travel.time_step).min(settings.particle_spacing) } else { 0.0 };
         self.skin = if lasts { SKIN * distance } else { 0.0 };
-        self.reach = search_radius(settings) + self.skin + 2.0 * distance;
+        self.reach = search_radius(settings) + self.skin + if lasts { 2.0 * distance } else { 0.0 };
         particles.drop_images();
         if reorder {
             self.grid.build(&particles.position, self.reach, settings.bounds());
             particles.reorder(self.grid.order());
         }
-        self.images.create(particles, &settings.domain, self.reach + self.skin);
+        // Images that come within reach during the step, too.
+        self.images.create(particles, &settings.domain, search_radius(settings) + 3.0 * distance);
         self.expected.clear();
         if lasts {
             self.expected.extend_from_slice(&particles.position);
