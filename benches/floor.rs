@@ -1,6 +1,6 @@
 //! What this machine can do, beside what the engine makes of it: memory bandwidth, arithmetic rate, and a pair loop written by
-//! hand, measured in the same run as the engine's passes over the same particles, on one thread. All take turns, and what counts
-//! is the median of each one's time over that of the loop by hand, because other work on the machine slows both.
+//! hand, measured in the same run as the engine's passes over the same particles, on one thread. All take turns, and the
+//! fastest of each counts, in units of the loop by hand: other work on the machine only ever slows a round down.
 //!
 //! `cargo bench --bench floor -- --save` keeps these ratios, and `cargo bench --bench floor` compares with those kept: so see
 //! whether a change made the engine slower.
@@ -34,11 +34,6 @@ fn seconds(work: &mut dyn FnMut()) -> f64 {
 /// Seconds of the fastest of all rounds: other work on the machine only ever slows one down.
 fn fastest(mut work: impl FnMut()) -> f64 {
     (0..ROUNDS).map(|_| seconds(&mut work)).fold(f64::INFINITY, f64::min)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// Sum an array: as fast as memory gives it.
@@ -286,14 +281,16 @@ fn main() {
     let saved: HashMap<String, f64> =
         std::fs::read_to_string(SAVED).ok().and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default();
     let mut ratios = HashMap::new();
+    let fastest = |times: &[f64]| times.iter().copied().fold(f64::INFINITY, f64::min);
+    let by_hand = fastest(&times[0]);
     println!();
     println!(
         "{:30} {:>8} {:>12} {:>7} {:>8} {:>8} {:>8}",
         "", "ns/pair", "pairs/s", "memory", "compute", "by hand", "saved"
     );
     for (measurement, measured) in measurements.iter().zip(&times) {
-        let fastest = measured.iter().copied().fold(f64::INFINITY, f64::min);
-        let ratio = median(measured.iter().zip(&times[0]).map(|(time, hand)| time / hand).collect()) / measurement.passes;
+        let fastest = fastest(measured);
+        let ratio = fastest / by_hand / measurement.passes;
         let bytes = entries * size_of::<Entry>() as f64 + (measurement.numbers * size_of::<f64>() * count) as f64;
         let part = |of: f64| if measurement.operations > 0.0 { format!("{:.0}%", 100.0 * of) } else { String::new() };
         println!(
@@ -309,9 +306,7 @@ fn main() {
         ratios.insert(measurement.name, ratio);
     }
     println!();
-    println!(
-        "ns, pairs/s: the fastest round, a directed pair and pass. by hand: the median of the time a pass over the loop by hand's."
-    );
+    println!("A directed pair and pass, the fastest round.");
     if save {
         let text = serde_json::to_string_pretty(&ratios).expect("numbers can be written");
         std::fs::write(SAVED, text).expect("target/ can be written");
