@@ -24,3 +24,13 @@ pub fn for_each<T: Send>(out: &mut [T], f: impl Fn(usize, &mut T) + Sync + Send)
         }
     });
 }
+
+/// The indices of `0..count` for which `holds`, in order, sought in parallel.
+pub fn filter(count: usize, holds: impl Fn(usize) -> bool + Sync + Send) -> Vec<usize> {
+    let chunk = |range: Range<usize>| range.filter(|&i| holds(i)).collect::<Vec<_>>();
+    let join = |mut all: Vec<usize>, mut part: Vec<usize>| {
+        all.append(&mut part);
+        all
+    };
+    reduce(count, chunk, join).unwrap_or_default()
+}

@@ -80,13 +80,12 @@ fn inlet_pressure<const D: usize>(settings: &Settings, particles: &Particles<D>)
     });
     let (mut sum, mut count) = (0.0, 0.0);
     for (axis, plane) in planes {
-        for i in 0..particles.real {
+        let near = parallel::filter(particles.real, |i| {
             let near = (particles.position[i][axis] - plane).abs() <= settings.particle_spacing;
-            if near && particles.kind[i] != ParticleKind::Solid {
-                sum += particles.pressure[i];
-                count += 1.0;
-            }
-        }
+            near && particles.kind[i] != ParticleKind::Solid
+        });
+        sum += near.iter().map(|&i| particles.pressure[i]).sum::<f64>();
+        count += near.len() as f64;
     }
     sum / count
 }

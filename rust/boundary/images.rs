@@ -25,7 +25,12 @@ impl<const D: usize> Images<D> {
             let count = particles.len();
             let (lower, upper) = (domain.lower[axis], domain.upper[axis]);
             let [lower_kind, upper_kind] = domain.boundaries[axis];
-            for i in 0..count {
+            let position = &particles.position;
+            let near = parallel::filter(count, |i| {
+                let x = position[i][axis];
+                (0.0..reach).contains(&(x - lower)) || (0.0..reach).contains(&(upper - x))
+            });
+            for i in near {
                 let x = particles.position[i][axis];
                 let sides = [(lower_kind, lower, x - lower, upper - lower), (upper_kind, upper, upper - x, lower - upper)];
                 for (kind, plane, distance, period) in sides {

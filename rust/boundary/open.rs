@@ -1,6 +1,7 @@
 //! What happens to particles that cross the sides of the domain: inlet and outlet buffers, periodic wrap, slip walls.
 
 use crate::neighbours::Grid;
+use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{Boundary, Settings};
 
@@ -21,13 +22,18 @@ pub fn end_step<const D: usize>(
 ) -> MassFlow {
     let sides = sides(settings);
     let of = |kind| sides.iter().filter(|side| side.kind == kind).copied().collect::<Vec<_>>();
-    of(Boundary::Slip).iter().for_each(|side| side.reflect(particles));
-    of(Boundary::Periodic).iter().for_each(|side| side.wrap(particles, settings));
-    let mut keep = vec![true; particles.real];
-    let left = leave(particles, &of(Boundary::Outlet), settings.buffer_length(), &mut keep);
-    let entered = enter(particles, &of(Boundary::Inlet), settings, grid, next_id);
-    keep.resize(particles.real, true);
-    if keep.contains(&false) {
+    // Most particles are inside, and stay what they are.
+    let near = parallel::filter(particles.real, |i| {
+        let buffer = matches!(particles.kind[i], ParticleKind::Inlet | ParticleKind::Outlet);
+        buffer || sides.iter().any(|side| side.inside(&particles.position[i]) <= 0.0)
+    });
+    of(Boundary::Slip).iter().for_each(|side| side.reflect(particles, &near));
+    of(Boundary::Periodic).iter().for_each(|side| side.wrap(particles, &near, settings));
+    let (left, gone) = leave(particles, &near, &of(Boundary::Outlet), settings.buffer_length());
+    let entered = enter(particles, &near, &of(Boundary::Inlet), settings, grid, next_id);
+    if !gone.is_empty() {
+        let mut keep = vec![true; particles.real];
+        gone.into_iter().for_each(|i| keep[i] = false);
         particles.retain(&keep);
     }
     let mass = settings.density * settings.particle_spacing.powi(D as i32);
@@ -62,14 +68,19 @@ fn outermost<const D: usize>(sides: &[Side], position: &Vector<D>) -> Option<(f6
     sides.iter().map(|&side| (side.inside(position), side)).min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Fluid that crosses an outlet becomes buffer, buffer that came back becomes fluid, buffer at its end goes. Returns the net
-/// number that left.
-fn leave<const D: usize>(particles: &mut Particles<D>, outlets: &[Side], buffer_length: f64, keep: &mut [bool]) -> i64 {
-    let mut left = 0;
+/// Of the particles `near`, fluid that crosses an outlet becomes buffer, buffer that came back becomes fluid, buffer at its end
+/// goes. Returns the net number that left, and those that go.
+fn leave<const D: usize>(
+    particles: &mut Particles<D>,
+    near: &[usize],
+    outlets: &[Side],
+    buffer_length: f64,
+) -> (i64, Vec<usize>) {
+    let (mut left, mut gone) = (0, Vec::new());
     if outlets.is_empty() {
-        return left;
+        return (left, gone);
     }
-    for i in 0..particles.real {
+    for &i in near {
         let inside = outermost(outlets, &particles.position[i]).map_or(0.0, |(inside, _)| inside);
         match particles.kind[i] {
             ParticleKind::Fluid if inside < 0.0 => {
@@ -81,27 +92,28 @@ fn leave<const D: usize>(particles: &mut Particles<D>, outlets: &[Side], buffer_
                 particles.kind[i] = ParticleKind::Fluid;
                 left -= 1;
             }
-            ParticleKind::Outlet if inside < -buffer_length => keep[i] = false,
+            ParticleKind::Outlet if inside < -buffer_length => gone.push(i),
             _ => {}
         }
     }
-    left
+    (left, gone)
 }
 
-/// Inlet particles that have entered the domain become fluid, and new ones follow at the far end of the buffer. Returns
-/// how many entered.
+/// Of the particles `near`, those of the inlet that have entered the domain become fluid, and new ones follow at the far end of
+/// the buffer. Returns how many entered.
 fn enter<const D: usize>(
     particles: &mut Particles<D>,
+    near: &[usize],
     inlets: &[Side],
     settings: &Settings,
     grid: &Grid<D>,
     next_id: &mut u64,
 ) -> usize {
-    let crossed = |i: &usize| match particles.kind[*i] {
-        ParticleKind::Inlet => outermost(inlets, &particles.position[*i]).filter(|(inside, _)| *inside >= 0.0),
+    let crossed = |i: usize| match particles.kind[i] {
+        ParticleKind::Inlet => outermost(inlets, &particles.position[i]).filter(|(inside, _)| *inside >= 0.0),
         _ => None,
     };
-    let entered: Vec<(usize, Side)> = (0..particles.real).filter_map(|i| crossed(&i).map(|(_, side)| (i, side))).collect();
+    let entered: Vec<(usize, Side)> = near.iter().filter_map(|&i| crossed(i).map(|(_, side)| (i, side))).collect();
     let refill: Vec<_> = entered.iter().map(|&(i, side)| refill(particles, settings, grid, i, side)).collect();
     for (&(i, _), (position, pressure)) in entered.iter().zip(refill) {
         let new = particles.push_copy(i);
@@ -148,8 +160,8 @@ impl Side {
     }
 
     /// Put back what slipped through a slip wall by rounding or by a shift.
-    fn reflect<const D: usize>(&self, particles: &mut Particles<D>) {
-        for i in 0..particles.real {
+    fn reflect<const D: usize>(&self, particles: &mut Particles<D>, near: &[usize]) {
+        for &i in near {
             if particles.kind[i] != ParticleKind::Solid && self.inside(&particles.position[i]) < 0.0 {
                 let x = &mut particles.position[i][self.axis];
                 *x = 2.0 * self.plane - *x;
@@ -158,9 +170,10 @@ impl Side {
         }
     }
 
-    fn wrap<const D: usize>(&self, particles: &mut Particles<D>, settings: &Settings) {
+    fn wrap<const D: usize>(&self, particles: &mut Particles<D>, near: &[usize], settings: &Settings) {
         let period = settings.domain.upper[self.axis] - settings.domain.lower[self.axis];
-        for position in &mut particles.position[..particles.real] {
+        for &i in near {
+            let position = &mut particles.position[i];
             // The upper plane is the lower one.
             if self.inside(position) < 0.0 || (self.inward < 0.0 && self.inside(position) == 0.0) {
                 position[self.axis] += self.inward * period;
