@@ -178,10 +178,15 @@ where
     #[inline(always)]
     fn visit<V: Lanes>(&self, cluster: Cluster, row: Row<'_>, a: &mut [A], b: &mut [B]) {
         let mut near = Corrected { cluster, row, position: self.position, correction: self.correction };
-        let values = self.operator.apply::<V>(&mut near);
-        for (lane, ((value, a), b)) in values.into_iter().zip(a).zip(b).enumerate() {
-            (self.f)(cluster.first + lane, value, a, b);
-        }
+        hand_out(cluster, self.operator.apply::<V>(&mut near), a, b, &self.f);
+    }
+}
+
+/// `f(i, value, a, b)` for each particle of a cluster.
+#[inline(always)]
+fn hand_out<T, A, B>(cluster: Cluster, values: [T; LANES], a: &mut [A], b: &mut [B], f: &impl Fn(usize, T, &mut A, &mut B)) {
+    for (lane, ((value, a), b)) in values.into_iter().zip(a).zip(b).enumerate() {
+        f(cluster.first + lane, value, a, b);
     }
 }
 
@@ -321,10 +326,7 @@ where
         let Self { position, volume, nominal, .. } = *self;
         let alpha = [[V::zero(); D]; D];
         let mut near = Correcting { cluster, row, position, volume, nominal, alpha, correction };
-        let values = self.operator.apply::<V>(&mut near);
-        for (lane, ((value, a), b)) in values.into_iter().zip(a).zip(b).enumerate() {
-            (self.f)(cluster.first + lane, value, a, b);
-        }
+        hand_out(cluster, self.operator.apply::<V>(&mut near), a, b, &self.f);
     }
 }
 
