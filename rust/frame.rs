@@ -3,7 +3,7 @@
 use crate::boundary::Images;
 use crate::neighbours::Grid;
 use crate::parallel::{self, CHUNK};
-use crate::particles::{ParticleKind, Particles, Vector};
+use crate::particles::{Particles, Vector};
 use crate::settings::{DerivativeFrame, Settings};
 use crate::stencil::Stencil;
 use rayon::prelude::*;
@@ -51,10 +51,8 @@ impl<const D: usize> Frame<D> {
         self.expected.clear();
         if lasts {
             self.expected.extend_from_slice(&particles.position);
-            let still =
-                |i: usize| particles.kind[i] == ParticleKind::Solid && !settings.bodies[particles.body[i] as usize].moves;
             parallel::for_each(&mut self.expected, |i, r| {
-                if !still(i) {
+                if !particles.is_fixed(i, &settings.bodies) {
                     *r += particles.velocity[i] * travel.time_step;
                 }
             });

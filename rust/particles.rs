@@ -1,6 +1,7 @@
 //! The particles: structure of arrays, real particles first, their images after them.
 
 use crate::error::{Error, Result};
+use crate::settings::Body;
 use serde::{Deserialize, Serialize};
 
 pub type Vector<const D: usize> = nalgebra::SVector<f64, D>;
@@ -101,6 +102,11 @@ impl<const D: usize> Particles<D> {
     pub fn push_copy(&mut self, source: usize) -> usize {
         each_array!(self, array => array.push(array[source]));
         self.len() - 1
+    }
+
+    /// Whether particle `i` stays where it is: a solid of a body that does not move.
+    pub fn is_fixed(&self, i: usize, bodies: &[Body]) -> bool {
+        self.kind[i] == ParticleKind::Solid && !bodies[self.body[i] as usize].moves
     }
 
     /// Number of real particles of each kind: fluid, inlet, outlet, solid.

@@ -184,15 +184,15 @@ impl<const D: usize> Alsph<D> {
 
     /// r^{n+1} (12), for everything that moves with its velocity.
     pub fn advance_positions(&self, step: Step, particles: &mut Particles<D>, frame: &Frame<D>) {
-        let Particles { real, kind, body, velocity, position, .. } = particles;
-        let bodies = &step.settings.bodies;
-        parallel::for_each(&mut position[..*real], |i, r| {
-            let fixed = kind[i] == ParticleKind::Solid && !bodies[body[i] as usize].moves;
-            if !fixed {
-                *r = self.position_initial[i] + (self.velocity_initial[i] + velocity[i]) * (0.5 * step.time_step);
+        let mut position = std::mem::take(&mut particles.position);
+        parallel::for_each(&mut position[..particles.real], |i, r| {
+            if !particles.is_fixed(i, &step.settings.bodies) {
+                let velocity = self.velocity_initial[i] + particles.velocity[i];
+                *r = self.position_initial[i] + velocity * (0.5 * step.time_step);
             }
         });
-        frame.images.positions(position);
+        frame.images.positions(&mut position);
+        particles.position = position;
     }
 
     /// max and Σ of |∇·u| over the fluid.
