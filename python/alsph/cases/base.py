@@ -15,6 +15,7 @@ from pydantic import Field
 
 from alsph.errors import ConfigError
 from alsph.geometry import FloatArray, Problem
+from alsph.measures import Measure, Profile
 from alsph.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -107,6 +108,14 @@ class Case(Parameters):
     def surface_points(self) -> tuple[FloatArray, FloatArray] | None:
         """Return ``angle`` (m,) [degrees from the front] and ``position`` (m, d) of the C_p samples."""
         return None
+
+    def measures(self, run: Run) -> list[Measure]:
+        """Return what a run of this case is judged by."""
+        return []
+
+    def profiles(self, run: Run) -> list[Profile]:
+        """Return the curves of a run of this case that have a reference."""
+        return []
 
     @property
     def particle_spacing(self) -> float:
