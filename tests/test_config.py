@@ -35,7 +35,7 @@ def test_file_with_the_case_only_has_the_defaults(model, tmp_path):
     path.write_text(f'case = "{model.name}"\n')
     loaded = config.load(path)
     assert loaded == Config(model())
-    assert loaded.until == model.default_until
+    assert loaded.until == model().default_until
 
 
 @pytest.mark.parametrize("model", [*CASES.values(), RunSettings])

@@ -115,7 +115,9 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
         first,
         *keywords,
         *_options(model, model.parameter_names(), {}),
-        *_options(RunSettings, RunSettings.model_fields, {"until": f"{model.default_until:g}", "threads": "all cores"}),
+        *_options(
+            RunSettings, RunSettings.model_fields, {"until": f"{model().default_until:g}", "threads": "all cores"}
+        ),
     ]
     functools.update_wrapper(command, action)
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]

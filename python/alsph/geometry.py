@@ -1,11 +1,15 @@
 """Particle arrangements, and the problem that is handed to the engine."""
 
+import itertools
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import KDTree
+from shapely import Polygon
 
 FloatArray = NDArray[np.float64]
 
@@ -86,16 +90,16 @@ def symmetric_centres(count: int, spacing: float) -> FloatArray:
     return spacing * (np.arange(count, dtype=np.float64) - 0.5 * (count - 1))
 
 
-@dataclass(frozen=True)
-class Rings:
-    """Solid particles of a circular cylinder.
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """Where the solid particles of a body or wall lie.
 
     Attributes
     ----------
     position
-        Positions relative to the centre (n, 2).
+        Positions (n, 2).
     normal
-        Outward unit normals (n, 2).
+        Unit normals (n, 2) of the surface, from the solid into the fluid; zero midway between parallel faces.
     depth
         Distances below the surface (n,).
     """
@@ -104,9 +108,21 @@ class Rings:
     normal: FloatArray
     depth: FloatArray
 
+    def where(self, chosen: NDArray[np.bool_]) -> "Solid":
+        """Return the particles for which `chosen` (n,) is true."""
+        return Solid(self.position[chosen], self.normal[chosen], self.depth[chosen])
 
-def cylinder_rings(radius: float, spacing: float, layers: int) -> Rings:
-    """Place particles on concentric rings at depths of 1/2, 3/2, ... spacings below the surface.
+    def moved(self, offset: FloatArray) -> "Solid":
+        """Return the particles moved by `offset` (2,)."""
+        return Solid(self.position + offset, self.normal, self.depth)
+
+    def particles(self, velocity: ArrayLike = 0.0, body: int = 0) -> dict[str, NDArray[Any]]:
+        """Return the arrays of these particles as part of the body with that index."""
+        return particles(Kind.SOLID, self.position, velocity, body=body, normal=self.normal, depth=self.depth)
+
+
+def cylinder_rings(radius: float, spacing: float, layers: int) -> Solid:
+    """Place particles on concentric rings about 0 at depths of 1/2, 3/2, ... spacings below the surface.
 
     The upper half is generated and mirrored, so that the arrangement is exactly symmetric about y = 0.
     """
@@ -120,4 +136,88 @@ def cylinder_rings(radius: float, spacing: float, layers: int) -> Rings:
         normals.append(np.concatenate([upper, upper * (1.0, -1.0)]))
         depths.append(np.full(2 * half, depth))
     normal, depth = np.concatenate(normals), np.concatenate(depths)
-    return Rings(normal * (radius - depth)[:, None], normal, depth)
+    return Solid(normal * (radius - depth)[:, None], normal, depth)
+
+
+def cells(region: Polygon, spacing: float, margin: int = 0) -> FloatArray:
+    """Return the cell centres (n, 2) of a lattice over the bounds of `region`, with `margin` more cells on each side.
+
+    The lattice starts at the bounds' lower corner; walls along its lines lie midway between two layers of particles.
+    """
+    left, bottom, right, top = region.bounds
+    counts = [round((right - left) / spacing), round((top - bottom) / spacing)]
+    axes = [spacing * (np.arange(-margin, count + margin) + 0.5) for count in counts]
+    return lattice(left + axes[0], bottom + axes[1])
+
+
+def inside(region: Polygon, points: FloatArray) -> NDArray[np.bool_]:
+    """Return which of the points (n, 2) lie in `region`."""
+    return np.asarray(shapely.contains_xy(region, *points.T))
+
+
+def walls(region: Polygon, spacing: float, layers: int) -> Solid:
+    """Place solid particles on the lattice of :func:`cells` around a region of fluid, up to `layers` spacings deep."""
+    points = cells(region, spacing, layers)
+    distance = shapely.distance(region, shapely.points(points))
+    return _facing(points[(distance > 0) & (distance < layers * spacing)], region, spacing)
+
+
+def body_layers(shape: Polygon, spacing: float, layers: int) -> Solid:
+    """Place solid particles on layers that follow the surface of a body, at depths of 1/2, 3/2, ... spacings.
+
+    Parts too thin for a layer, such as a sharp trailing edge, get a single file of particles along their middle.
+    """
+    rings = [_along(ring, spacing) for depth in cell_centres(layers, spacing) for ring in _offset(shape, depth)]
+    position = np.concatenate([np.empty((0, 2)), *rings])
+    for depth in spacing * np.linspace(0.5, 0.05, 19):
+        candidates = np.concatenate([np.empty((0, 2)), *(_along(ring, spacing / 8) for ring in _offset(shape, depth))])
+        while len(candidates):
+            room = KDTree(position).query(candidates)[0] if len(position) else np.full(len(candidates), np.inf)
+            if room.max() < spacing:
+                break
+            position = np.concatenate([position, candidates[[room.argmax()]]])
+    return _facing(position, shape, spacing)
+
+
+def _facing(position: FloatArray, shape: Polygon, spacing: float) -> Solid:
+    """Solid particles at `position` with their depths below the boundary of `shape`, and the normals there.
+
+    The normal is the gradient of the depth. On the bisector of a corner, where two boundary points are nearest, it is
+    the bisector, so that symmetric arrangements have symmetric normals.
+    """
+
+    def depth(points: FloatArray) -> FloatArray:
+        return np.asarray(shapely.distance(shape.boundary, shapely.points(points)))
+
+    step = 1e-3 * spacing
+    gradient = np.stack([depth(position - e) - depth(position + e) for e in step * np.eye(2)], axis=1)
+    size = np.hypot(*gradient.T)[:, None]
+    return Solid(
+        position, np.divide(gradient, size, out=np.zeros_like(position), where=size > 1e-3 * step), depth(position)
+    )
+
+
+def _offset(shape: Polygon, depth: float) -> list[FloatArray]:
+    """Return the vertices (n, 2) of the curves at that depth below the surface of `shape`."""
+    parts = shapely.get_parts(shape.buffer(-depth))
+    return [shapely.get_coordinates(part.exterior)[:-1] for part in parts if not part.is_empty]
+
+
+def _along(vertices: FloatArray, spacing: float) -> FloatArray:
+    """Return points (m, 2) along a closed curve, about `spacing` apart, one on each corner of more than 30 degrees.
+
+    Without corners, the vertex with the largest x lies midway between two of them.
+    """
+    edge = np.roll(vertices, -1, axis=0) - vertices
+    turn = np.angle(np.exp(1j * np.diff(np.arctan2(*edge.T[::-1]), prepend=np.arctan2(*edge[-1, ::-1]))))
+    corners = np.flatnonzero(np.abs(turn) > np.radians(30))
+    first = corners[0] if len(corners) else int(vertices[:, 0].argmax())
+    closed = np.roll(vertices, -first, axis=0)[np.r_[: len(vertices), 0]]
+    ends = np.r_[corners - first, len(vertices)] if len(corners) else np.array([0, len(vertices)])
+    points = []
+    for start, end in itertools.pairwise(ends):
+        side = shapely.LineString(closed[start : end + 1])
+        count = max(1, round(side.length / spacing))
+        share = (np.arange(count) + (0.0 if len(corners) else 0.5)) / count
+        points.append(shapely.get_coordinates(shapely.line_interpolate_point(side, share, normalized=True)))
+    return np.concatenate(points)

@@ -1,12 +1,18 @@
 """Particle fields at points, and the momentum balance of a box around a body."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from alsph.geometry import FloatArray
+
+if TYPE_CHECKING:
+    from alsph.results import Run
 
 NEIGHBOURS_PER_DIMENSION = 8
 VOID = 1.5  # points further than this many Δx from every particle have no value
@@ -68,6 +74,24 @@ def interpolate(
     moments = np.swapaxes(basis, 1, 2) @ (weight * basis)
     coefficients = np.linalg.pinv(moments, hermitian=True) @ (np.swapaxes(basis, 1, 2) @ (weight * values[index]))
     return coefficients[:, 0], np.swapaxes(coefficients[:, 1 : points.shape[1] + 1], 1, 2) / spacing
+
+
+def late_velocity(run: Run, points: FloatArray, share: float = 0.25) -> FloatArray:
+    """Fluid velocities (m, d) at points, averaged over the snapshots in the last `share` of the run; NaN without any.
+
+    Parameters
+    ----------
+    run : Run
+    points : ndarray, shape (m, d)
+        Points in the fluid [D].
+    share : float
+        Share of the time reached.
+    """
+    total, late = np.zeros_like(points), run.times[run.times >= (1 - share) * run.times[-1:]]
+    for snapshot in map(run.snapshot, late):
+        position, velocity = snapshot.position[snapshot.fluid], snapshot.velocity[snapshot.fluid]
+        total += interpolate(position, velocity, points, run.spacing)[0]
+    return total / len(late) if len(late) else np.full_like(points, np.nan)
 
 
 def control_volume(

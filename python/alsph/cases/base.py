@@ -35,7 +35,6 @@ class Case(Parameters):
 
     name: ClassVar[str]
     title: ClassVar[str]
-    default_until: ClassVar[float]
     velocity_max: ClassVar[float] = 1.0
     """Expected largest velocity in U, for estimates of the time step."""
     coefficient_body: ClassVar[str | None] = None
@@ -86,8 +85,22 @@ class Case(Parameters):
 
     @property
     @abstractmethod
+    def default_until(self) -> float:
+        """End time of a run that is given none [D/U]."""
+
+    @property
     def space_dimensions(self) -> int:
         """Number of space dimensions, 2 or 3."""
+        return 2
+
+    @property
+    def kinematic_viscosity(self) -> float:
+        """Kinematic viscosity ν [UD]."""
+        return 1.0 / self.reynolds
+
+    def body_force(self) -> list[float]:
+        """Return the body force per unit mass (d,) [U²/D]."""
+        return [0.0] * self.space_dimensions
 
     @abstractmethod
     def domain(self) -> dict[str, Any]:
@@ -127,6 +140,11 @@ class Case(Parameters):
         """Support radius in particle spacings, rounded up."""
         return math.ceil(SUPPORT[self.kernel] * self.smoothing_ratio - 1e-9)
 
+    @property
+    def buffer_columns(self) -> int:
+        """Length of the inlet and outlet buffers, 6h, in particle spacings."""
+        return math.ceil(6 * self.smoothing_ratio - 1e-9)
+
     def settings(self) -> dict[str, Any]:
         """Return the engine's settings (see docs/architecture.md)."""
         shared = (
@@ -137,8 +155,8 @@ class Case(Parameters):
             "dimensions": self.space_dimensions,
             "particle_spacing": self.particle_spacing,
             "density": 1.0,
-            "kinematic_viscosity": 1.0 / self.reynolds,
-            "body_force": [0.0] * self.space_dimensions,
+            "kinematic_viscosity": self.kinematic_viscosity,
+            "body_force": self.body_force(),
             "time_step": self.time_step * self.particle_spacing,
             "derivative_frame": "initial" if self.algorithm == 2 else "updated",
             "search_every_iteration": self.algorithm == "original",

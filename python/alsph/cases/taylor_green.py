@@ -16,7 +16,6 @@ class TaylorGreen(Case):
 
     name: ClassVar[str] = "taylor_green"
     title: ClassVar[str] = "decaying Taylor-Green vortices in a periodic box"
-    default_until: ClassVar[float] = 1.0
 
     resolution: int = Field(default=50, ge=8, description="particles per side of the box, D/Δx [-]")
     dimensions: Literal[2, 3] = Field(default=2, description="number of space dimensions")
@@ -29,6 +28,11 @@ class TaylorGreen(Case):
     shifting: Literal["xsph", "maximum_velocity", "none"] = Field(
         default="maximum_velocity", description=Case.model_fields["shifting"].description
     )
+
+    @property
+    def default_until(self) -> float:
+        """One time unit."""
+        return 1.0
 
     @property
     def space_dimensions(self) -> int:

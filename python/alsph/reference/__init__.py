@@ -30,6 +30,12 @@ class Reference:
     pressure_coefficient: tuple[FloatArray, FloatArray] | None = None
 
 
+def rows(name: str) -> list[dict[str, str]]:
+    """Return the rows of a CSV file of this folder by column."""
+    with (FOLDER / name).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
 def find(case: dict[str, Any]) -> Reference | None:
     """Return the reference solution of a case with these parameters, None where there is none."""
     if case.items() >= CHANNEL.items():
@@ -40,8 +46,7 @@ def find(case: dict[str, Any]) -> Reference | None:
 
 
 def _cylinder(reynolds: float) -> Reference | None:
-    with (FOLDER / "cylinder_summary.csv").open(encoding="utf-8", newline="") as file:
-        row = next((row for row in csv.DictReader(file) if float(row["Re"]) == reynolds), None)
+    row = next((row for row in rows("cylinder_summary.csv") if float(row["Re"]) == reynolds), None)
     if row is None:
         return None
     profile = FOLDER / f"cylinder_cp_Re{row['Re']}.csv"

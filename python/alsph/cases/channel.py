@@ -1,0 +1,110 @@
+"""What the cases of a body in a channel share: inlet, outlet, free-slip walls and the flow at the start."""
+
+from abc import abstractmethod
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, field_validator, model_validator
+
+from alsph.cases.base import Case
+from alsph.geometry import FloatArray, Kind, Solid, cell_centres, join, lattice, particles, symmetric_centres
+
+
+class Channel(Case):
+    """Flow past a body in a channel with free-slip walls and uniform inflow U.
+
+    The inlet lies at x = 0 and the centre line at y = 0; lengths are in D, velocities in U.
+    """
+
+    velocity_max: ClassVar[float] = 1.5
+    body_name: ClassVar[str]
+
+    reynolds: float = Field(default=200.0, gt=0, description="Reynolds number UD/ν [-]")
+    resolution: int = Field(default=20, gt=0, description="particles per diameter, D/Δx; at least 8 [-]")
+    length: float = Field(default=14.0, gt=0, description="length of the channel [D]")
+    height: float = Field(default=13.0, gt=0, description="height of the channel [D]")
+    upstream: float = Field(default=4.0, gt=0, description="distance from the inlet to the centre of the body [D]")
+    perturbation: float = Field(
+        default=0.1,
+        ge=0,
+        le=1,
+        description="largest velocity of an initial vortex about the body that starts shedding; 0: symmetric [U]",
+    )
+
+    @field_validator("resolution")
+    @classmethod
+    def _resolved(cls, resolution: int) -> int:
+        if resolution < 8:
+            raise ValueError("too coarse for the body; use 8 or more")
+        return resolution
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        for name, room in (
+            ("height", self.height / 2),
+            ("upstream", self.upstream),
+            ("length", self.length - self.upstream),
+        ):
+            if room < 1:
+                raise ValueError(
+                    f"{name} = {getattr(self, name):g}: the {self.body_name} does not fit; leave at least 1 D from "
+                    f"centre to each side (length {self.length:g}, height {self.height:g}, upstream {self.upstream:g})"
+                )
+        self.whole_cells("length", self.length)
+        self.whole_cells("height", self.height)
+        return self
+
+    @abstractmethod
+    def solid(self) -> Solid:
+        """Return the solid particles of the body, relative to its centre."""
+
+    @abstractmethod
+    def outside(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Return which points (n, 2), relative to the centre of the body, lie outside it."""
+
+    @property
+    def default_until(self) -> float:
+        """Some ten shedding periods."""
+        return 60.0
+
+    @property
+    def centre(self) -> FloatArray:
+        """Centre of the body (2,) [D]."""
+        return np.array([self.upstream, 0.0])
+
+    def domain(self) -> dict[str, Any]:
+        """Return the channel: inlet at x = 0, outlet at x = length, free-slip walls at y = ± height/2."""
+        return {
+            "lower": [0.0, -self.height / 2],
+            "upper": [self.length, self.height / 2],
+            "boundaries": [["inlet", "outlet"], ["slip", "slip"]],
+        }
+
+    def bodies(self) -> list[dict[str, Any]]:
+        """Return the body, at rest."""
+        return [{"name": self.body_name, "velocity": [0.0, 0.0], "moves": False, "center": [self.upstream, 0.0]}]
+
+    def particle_estimate(self) -> int:
+        """Return about how many particles there are, solid and buffers included."""
+        return round((self.length * self.resolution + 2 * self.buffer_columns) * self.height * self.resolution)
+
+    def particles(self) -> dict[str, NDArray[Any]]:
+        """Return a uniform lattice around the body's solid particles, impulsively started."""
+        spacing = self.particle_spacing
+        rows = symmetric_centres(self.whole_cells("height", self.height), spacing)
+        buffer = cell_centres(self.buffer_columns, spacing)
+        channel = lattice(cell_centres(self.whole_cells("length", self.length), spacing), rows)
+        fluid = channel[self.outside(channel - self.centre)]
+        return join(
+            particles(Kind.FLUID, fluid, self._initial_velocity(fluid)),
+            particles(Kind.INLET, lattice(-buffer, rows), [1.0, 0.0]),
+            particles(Kind.OUTLET, lattice(self.length + buffer, rows), [1.0, 0.0]),
+            self.solid().moved(self.centre).particles(),
+        )
+
+    def _initial_velocity(self, position: FloatArray) -> FloatArray:
+        """Uniform flow and a Gaussian vortex (divergence-free) about the body, fastest 0.6 D from its centre."""
+        x, y = ((position - self.centre) / 0.6).T
+        swirl = self.perturbation * np.exp(0.5 * (1 - x**2 - y**2))
+        return np.stack([1.0 - swirl * y, swirl * x], axis=1)
