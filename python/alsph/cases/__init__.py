@@ -1,14 +1,17 @@
 """The cases, by name. A new case is one file and one entry here."""
 
 from alsph.cases.base import Case
+from alsph.cases.cavity import Cavity
+from alsph.cases.couette import Couette
 from alsph.cases.cylinder import Cylinder
+from alsph.cases.poiseuille import Poiseuille
 from alsph.cases.taylor_green import TaylorGreen
 from alsph.errors import ConfigError
 from alsph.parameters import suggest
 
-CASES: dict[str, type[Case]] = {case.name: case for case in (Cylinder, TaylorGreen)}
+CASES: dict[str, type[Case]] = {case.name: case for case in (Cylinder, TaylorGreen, Cavity, Poiseuille, Couette)}
 
-__all__ = ["CASES", "Case", "Cylinder", "TaylorGreen", "find"]
+__all__ = ["CASES", "Case", "Cavity", "Couette", "Cylinder", "Poiseuille", "TaylorGreen", "find"]
 
 
 def find(name: str) -> type[Case]:

@@ -1,0 +1,108 @@
+"""Lid-driven cavity: the steady flow in a square box whose top slides."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pydantic import Field
+
+from alsph import reference, sampling
+from alsph.cases.base import Case
+from alsph.geometry import FloatArray, Kind, cells, join, particles, walls
+from alsph.measures import Measure, Profile
+
+if TYPE_CHECKING:
+    from alsph.results import Run
+
+BOX = shapely.box(0, 0, 1, 1)
+LINE = np.linspace(0, 1, 401)[1:-1]
+FINITE_ELEMENTS = "independent finite-element solution (alsph/reference)"
+GHIA = "Ghia, Ghia and Shin, J. Comput. Phys. 48 (1982) 387"
+
+
+class Cavity(Case):
+    """Flow in a square cavity of side D, driven by its lid at y = D, which slides along x with the velocity U.
+
+    The fluid starts from rest and comes to a steady state. Compared are the velocities on the centre lines: with a
+    finite-element solution at Re = 100 and 1000, and with Ghia, Ghia and Shin (1982) at Re = 400. The steady flow is
+    stable in 2-D up to a Reynolds number of about 8000.
+    """
+
+    name: ClassVar[str] = "cavity"
+    title: ClassVar[str] = "lid-driven cavity"
+
+    resolution: int = Field(default=50, ge=8, description="particles per side of the cavity, D/Δx [-]")
+
+    @property
+    def default_until(self) -> float:
+        """Time by which the flow is steady; it grows with the Reynolds number."""
+        return 20.0 + self.reynolds / 25
+
+    def domain(self) -> dict[str, Any]:
+        """Return the cavity; solid particles close all sides."""
+        return {"lower": [0.0, 0.0], "upper": [1.0, 1.0], "boundaries": [["none", "none"]] * 2}
+
+    def bodies(self) -> list[dict[str, Any]]:
+        """Return the walls at rest, and the lid, which slides in place."""
+        centre = {"moves": False, "center": [0.5, 0.5]}
+        return [{"name": "walls", "velocity": [0.0, 0.0]} | centre, {"name": "lid", "velocity": [1.0, 0.0]} | centre]
+
+    def particle_estimate(self) -> int:
+        """Return about how many particles there are, without the walls' outer corners."""
+        return self.resolution**2 + 4 * self.support_layers * (self.resolution + self.support_layers)
+
+    def particles(self) -> dict[str, NDArray[Any]]:
+        """Return a lattice of fluid at rest and the solid particles around it."""
+        solid = walls(BOX, self.particle_spacing, self.support_layers)
+        x, y = solid.position.T
+        lid = (y > 1) & (x > 0) & (x < 1)
+        return join(
+            particles(Kind.FLUID, cells(BOX, self.particle_spacing), 0.0),
+            solid.where(~lid).particles(),
+            solid.where(lid).particles([1.0, 0.0], body=1),
+        )
+
+    def measures(self, run: Run) -> list[Measure]:
+        """Return the extrema of the velocities on the centre lines, averaged over the last quarter of the run."""
+        row = next((row for row in reference.rows("cavity_extrema.csv") if float(row["Re"]) == self.reynolds), None)
+        if row is None:
+            return []
+        u, v = self._centre_lines(run)
+        computed = {"umin": u.min(), "vmax": v.max(), "vmin": v.min()}
+        names = {
+            "umin": "smallest u at x = D/2, U",
+            "vmax": "largest v at y = D/2, U",
+            "vmin": "smallest v at y = D/2, U",
+        }
+        tolerance = {100: 0.01, 400: 0.02, 1000: 0.04}[round(self.reynolds)]
+        return [
+            Measure(names[key], float(value), float(row[key]), tolerance, self._source)
+            for key, value in computed.items()
+        ]
+
+    def profiles(self, run: Run) -> list[Profile]:
+        """Return u(y) at x = D/2 and v(x) at y = D/2, averaged over the last quarter of the run."""
+        files = {100: "cavity_Re100_profile101.csv", 400: "cavity_Re400_ghia.csv", 1000: "cavity_Re1000_profile101.csv"}
+        if self.reynolds not in files:
+            return []
+        table = np.loadtxt(reference.FOLDER / files[round(self.reynolds)], delimiter=",", skiprows=1).T
+        y, u, x, v = table if len(table) == 4 else table[[0, 1, 0, 2]]
+        computed_u, computed_v = self._centre_lines(run)
+        return [
+            Profile("u at x = D/2", ("$y/D$", "$u/U$"), (LINE, computed_u), (y, u), self._source),
+            Profile("v at y = D/2", ("$x/D$", "$v/U$"), (LINE, computed_v), (x, v), self._source),
+        ]
+
+    @property
+    def _source(self) -> str:
+        return GHIA if self.reynolds == 400 else FINITE_ELEMENTS
+
+    @staticmethod
+    def _centre_lines(run: Run) -> tuple[FloatArray, FloatArray]:
+        """Return u at x = D/2 and v at y = D/2 along `LINE`."""
+        middle = np.full_like(LINE, 0.5)
+        velocity = sampling.late_velocity(run, np.stack([np.r_[middle, LINE], np.r_[LINE, middle]], axis=1))
+        return velocity[: len(LINE), 0], velocity[len(LINE) :, 1]

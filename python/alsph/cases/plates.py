@@ -1,0 +1,110 @@
+"""What Poiseuille and Couette flow share: fluid between two parallel plates, and the error of its profile."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from alsph.analysis import error_norms
+from alsph.cases.base import Case
+from alsph.errors import RunFolderError
+from alsph.geometry import FloatArray, Kind, cells, join, particles, walls
+from alsph.measures import Measure, Profile
+
+if TYPE_CHECKING:
+    from alsph.results import Run
+
+TERMS = np.arange(1, 401)[:, None]
+"""Indices of the terms of the series (400, 1); those that are left out have decayed after t* = 1e-4 Re."""
+
+
+class Plates(Case):
+    """Flow along x between no-slip plates at y = 0 and y = D, periodic along x; it starts from rest."""
+
+    upper_velocity: ClassVar[float]
+    source: ClassVar[str]
+
+    reynolds: float = Field(default=10.0, gt=0, description="Reynolds number UD/ν [-]")
+    resolution: int = Field(default=40, ge=8, description="particles between the plates, D/Δx [-]")
+    length: float = Field(default=0.5, gt=0, description="period along the plates [D]")
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.whole_cells("length", self.length) < self.support_layers:
+            raise ValueError(f"length = {self.length:g}: shorter than the kernel's support radius; use a longer one")
+        return self
+
+    @abstractmethod
+    def profile(self, y: FloatArray, time: float) -> FloatArray:
+        """Return the exact velocity (n,) along x [U] at heights y (n,) [D] and a time [D/U]."""
+
+    @property
+    def default_until(self) -> float:
+        """A quarter of the diffusion time D²/ν: the flow is then 90 % of the steady one."""
+        return 0.25 * self.reynolds
+
+    def exact(self, position: FloatArray, time: float) -> dict[str, FloatArray]:
+        """Return the exact ``velocity`` (n, 2) [U].
+
+        Parameters
+        ----------
+        position
+            Points (n, 2) [D].
+        time
+            Time [D/U].
+        """
+        return {"velocity": self.profile(position[:, 1], time)[:, None] * [1.0, 0.0]}
+
+    def domain(self) -> dict[str, Any]:
+        """Return one period; solid particles close it below and above."""
+        return {"lower": [0.0, 0.0], "upper": [self.length, 1.0], "boundaries": [["periodic"] * 2, ["none"] * 2]}
+
+    def bodies(self) -> list[dict[str, Any]]:
+        """Return the plates, which slide in place."""
+        velocities = {"lower": 0.0, "upper": self.upper_velocity}
+        return [
+            {"name": name, "velocity": [velocity, 0.0], "moves": False, "center": [self.length / 2, 0.5]}
+            for name, velocity in velocities.items()
+        ]
+
+    def particle_estimate(self) -> int:
+        """Return the number of particles."""
+        return round(self.length * self.resolution) * (self.resolution + 2 * self.support_layers)
+
+    def particles(self) -> dict[str, NDArray[Any]]:
+        """Return a lattice of fluid at rest between the solid particles of the plates."""
+        region = shapely.box(0, 0, self.length, 1)
+        solid = walls(region, self.particle_spacing, self.support_layers)
+        x, y = solid.position.T
+        period = (x > 0) & (x < self.length)
+        return join(
+            particles(Kind.FLUID, cells(region, self.particle_spacing), 0.0),
+            solid.where(period & (y < 0)).particles(),
+            solid.where(period & (y > 1)).particles([self.upper_velocity, 0.0], body=1),
+        )
+
+    def measures(self, run: Run) -> list[Measure]:
+        """Return the relative error (L2 over the particles) of the velocity in the last snapshot."""
+        try:
+            snapshot = run.snapshot()
+        except RunFolderError:  # no snapshot yet
+            error = np.nan
+        else:
+            exact = self.exact(snapshot.position, snapshot.time)["velocity"]
+            fluid = snapshot.fluid
+            error = error_norms(snapshot.velocity[fluid], exact[fluid])["l2"] if snapshot.time > 0 else np.nan
+        return [Measure("relative L2 error of the velocity", error, 0.0, 0.01, self.source)]
+
+    def profiles(self, run: Run) -> list[Profile]:
+        """Return the particles' velocities in the last snapshot over their heights."""
+        snapshot = run.snapshot()
+        y, u = snapshot.position[snapshot.fluid, 1], snapshot.velocity[snapshot.fluid, 0]
+        order, heights = np.argsort(y), np.linspace(0, 1, 201)
+        exact = heights, self.profile(heights, snapshot.time)
+        name = f"velocity at tU/D = {snapshot.time:.2f}"
+        return [Profile(name, ("$y/D$", "$u/U$"), (y[order], u[order]), exact, self.source)]
