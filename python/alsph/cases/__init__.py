@@ -1,6 +1,8 @@
 """The cases, by name. A new case is one file and one entry here."""
 
+from alsph.cases.backward_facing_step import BackwardFacingStep
 from alsph.cases.base import Case
+from alsph.cases.body import Body
 from alsph.cases.cavity import Cavity
 from alsph.cases.couette import Couette
 from alsph.cases.cylinder import Cylinder
@@ -9,9 +11,22 @@ from alsph.cases.taylor_green import TaylorGreen
 from alsph.errors import ConfigError
 from alsph.parameters import suggest
 
-CASES: dict[str, type[Case]] = {case.name: case for case in (Cylinder, TaylorGreen, Cavity, Poiseuille, Couette)}
+CASES: dict[str, type[Case]] = {
+    case.name: case for case in (Cylinder, Body, BackwardFacingStep, Cavity, Poiseuille, Couette, TaylorGreen)
+}
 
-__all__ = ["CASES", "Case", "Cavity", "Couette", "Cylinder", "Poiseuille", "TaylorGreen", "find"]
+__all__ = [
+    "CASES",
+    "BackwardFacingStep",
+    "Body",
+    "Case",
+    "Cavity",
+    "Couette",
+    "Cylinder",
+    "Poiseuille",
+    "TaylorGreen",
+    "find",
+]
 
 
 def find(name: str) -> type[Case]:

@@ -1,0 +1,102 @@
+"""Flow past a body of any shape in the cylinder's channel."""
+
+from functools import cached_property
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pydantic import Field, field_validator
+from shapely import affinity
+
+from alsph.cases.channel import Channel
+from alsph.geometry import FloatArray, Solid, body_layers, inside
+
+
+class Body(Channel):
+    """Flow past a body of any shape in a channel with free-slip walls and uniform inflow U.
+
+    D is the side of the square, the chord of the airfoil, or the unit of the file's lengths. The body's centroid lies
+    at (upstream, 0). The solid particles follow the surface; parts thinner than about 2Δx are badly resolved.
+    """
+
+    name: ClassVar[str] = "body"
+    title: ClassVar[str] = "flow past a body of any shape in a channel"
+    body_name: ClassVar[str] = "body"
+    coefficient_body: ClassVar[str | None] = "body"
+
+    shape: str = Field(
+        default="square_cylinder",
+        description="square_cylinder, naca0012, or a text file of the closed curve's points, a pair of lengths a line",
+    )
+    angle_of_attack: float = Field(default=0.0, ge=-180, le=180, description="angle of attack, nose up [degrees]")
+
+    @field_validator("shape")
+    @classmethod
+    def _known(cls, shape: str) -> str:
+        _outline(shape)
+        return shape
+
+    @cached_property
+    def outline(self) -> shapely.Polygon:
+        """The body, its centroid at the origin, turned by the angle of attack."""
+        outline = _outline(self.shape)
+        centred = affinity.translate(outline, -outline.centroid.x, -outline.centroid.y)
+        return affinity.rotate(centred, -self.angle_of_attack, origin=(0, 0))
+
+    def solid(self) -> Solid:
+        """Return layers along the surface."""
+        return body_layers(self.outline, self.particle_spacing, self.support_layers)
+
+    def outside(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Return which points lie outside the outline."""
+        return ~inside(self.outline, points)
+
+    def surface_points(self) -> tuple[FloatArray, FloatArray]:
+        """Return 144 points evenly along the surface; their angles are seen from the centroid."""
+        share = np.arange(144) / 144
+        points = shapely.get_coordinates(shapely.line_interpolate_point(self.outline.exterior, share, normalized=True))
+        angle = np.degrees(np.arctan2(points[:, 1], -points[:, 0])) % 360.0
+        order = np.argsort(angle, kind="stable")
+        return angle[order], self.centre + points[order]
+
+
+def _outline(shape: str) -> shapely.Polygon:
+    """Return the shape with that name or in that file, in D.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or its curve crosses itself.
+    """
+    if shape == "square_cylinder":
+        return shapely.box(-0.5, -0.5, 0.5, 0.5)
+    points = _naca0012() if shape == "naca0012" else _read(shape)
+    outline = shapely.Polygon(points)
+    if not outline.is_valid or outline.area == 0:
+        raise ValueError(f"no simple closed curve: {shapely.is_valid_reason(outline)}")
+    return outline
+
+
+def _naca0012(count: int = 100) -> FloatArray:
+    """Return points (2 count, 2) of the NACA 0012 airfoil of chord 1 with a closed trailing edge."""
+    x = 0.5 * (1 - np.cos(np.linspace(0, np.pi, count + 1)))
+    powers = np.stack([np.sqrt(x), x, x**2, x**3, x**4])
+    y = 0.6 * np.array([0.2969, -0.1260, -0.3516, 0.2843, -0.1036]) @ powers
+    return np.concatenate([np.stack([x, y], axis=1), np.stack([x, -y], axis=1)[-2:0:-1]])
+
+
+def _read(path: str) -> FloatArray:
+    """Return the two columns (n, 2) of a text file, separated by commas or blanks; its first line may be a title."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8").replace(",", " ").splitlines()
+    except (OSError, UnicodeDecodeError):
+        raise ValueError("neither square_cylinder nor naca0012 nor a readable file") from None
+    try:
+        points = np.loadtxt(lines, ndmin=2)
+    except ValueError:
+        points = np.loadtxt(lines[1:], ndmin=2)
+    if points.shape[1:] != (2,) or len(points) < 3:
+        raise ValueError("the file must hold three or more lines of two numbers")
+    return points
