@@ -7,12 +7,14 @@ from alsph.cases.cavity import Cavity
 from alsph.cases.couette import Couette
 from alsph.cases.cylinder import Cylinder
 from alsph.cases.poiseuille import Poiseuille
+from alsph.cases.pressure_jump import PressureJump
 from alsph.cases.taylor_green import TaylorGreen
 from alsph.errors import ConfigError
 from alsph.parameters import suggest
 
 CASES: dict[str, type[Case]] = {
-    case.name: case for case in (Cylinder, Body, BackwardFacingStep, Cavity, Poiseuille, Couette, TaylorGreen)
+    case.name: case
+    for case in (Cylinder, Body, BackwardFacingStep, Cavity, Poiseuille, Couette, PressureJump, TaylorGreen)
 }
 
 __all__ = [
