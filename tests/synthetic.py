@@ -7,6 +7,7 @@ import numpy as np
 from alsph.cases import Cylinder
 from alsph.config import Config, RunSettings
 from alsph.io import RunFolder
+from alsph.results import Run
 
 DRAG, DRAG_SWING, LIFT, STROUHAL, CIRCULATION = 1.48, 0.05, 0.75, 0.21, 1.0
 SHED = 2 * np.pi * STROUHAL
@@ -89,3 +90,23 @@ def write_run(path: Path, *, end=60.0) -> Path:
     for time in np.arange(0.0, end + 1, 10.0):
         folder.append_particles(float(time), particles(case))
     return path
+
+
+def write_flow(path: Path, case, velocity, times=(0.0, 1.0, 2.0), pressure=0.0) -> Run:
+    """Write a run folder of `case` with snapshots of its particles where they start and a `velocity` (position, time)."""
+    folder = RunFolder(path)
+    folder.create(Config(case, RunSettings(until=times[-1])))
+    (path / "run.json").write_text(json.dumps({"status": "finished", "case": case.name}))
+    state = case.particles()
+    solid = state["kind"] == 3
+    zero = np.zeros(len(solid))
+    for time in times:
+        field = np.where(solid[:, None], state["velocity"], velocity(state["position"], time))
+        derived = {
+            "velocity_divergence": zero,
+            "vorticity": zero,
+            "id": np.arange(len(solid)),
+            "pressure": zero + pressure,
+        }
+        folder.append_particles(time, state | {"velocity": field} | derived)
+    return Run(path)

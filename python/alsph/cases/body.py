@@ -57,7 +57,7 @@ class Body(Channel):
         """Return 144 points evenly along the surface; their angles are seen from the centroid."""
         share = np.arange(144) / 144
         points = shapely.get_coordinates(shapely.line_interpolate_point(self.outline.exterior, share, normalized=True))
-        angle = np.degrees(np.arctan2(points[:, 1], -points[:, 0])) % 360.0
+        angle = np.degrees(np.arctan2(points[:, 1], -points[:, 0])).round(9) % 360.0
         order = np.argsort(angle, kind="stable")
         return angle[order], self.centre + points[order]
 

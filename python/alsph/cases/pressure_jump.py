@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 
 class PressureJump(Case):
-    """Fluid in a square of side D that streams along y with U; it starts with p = ρU² in its left half and 0 elsewhere.
+    """Fluid in a square of side D that streams along y with U; at first p = ρU² in its left half, 0 in its right half.
 
-    The sides are free-slip walls along x and periodic along y. In an incompressible fluid the uniform stream is the only
-    solution: the jump is gone at once and moves nothing. The iterations of ALSPH answer as a fluid with a speed of sound
-    of about sqrt(max_iterations C_BV) U does: waves run to and fro, and die out. Compared with zero are what is left of
-    the jump, and of the motion that it has caused, at the end.
+    Free-slip walls bound it along x; it is periodic along y. In an incompressible fluid the uniform stream is the only
+    solution: the jump is gone at once and moves nothing. The iterations of ALSPH answer as a fluid with a speed of
+    sound of about sqrt(max_iterations C_BV) U does: waves run to and fro, and die out. Compared with zero are what is
+    left of the jump, and of the motion that it has caused, at the end.
 
     The set-up is our own. The stream is there because the penalty r_AL follows u_max: in fluid at rest it would vanish.
     """

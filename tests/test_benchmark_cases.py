@@ -1,0 +1,260 @@
+"""The cases with a reference solution: cavity, plates, step, pressure jump; and bodies of any shape."""
+
+import numpy as np
+import pytest
+import shapely
+from alsph import reference, sampling
+from alsph.cases import CASES, BackwardFacingStep, Body, Cavity, Couette, Cylinder, Poiseuille, PressureJump
+from alsph.cases.backward_facing_step import last_upward_zero
+from alsph.errors import ConfigError
+from alsph.geometry import Kind
+from scipy.spatial import KDTree
+from synthetic import write_flow
+
+
+@pytest.mark.parametrize("model", [Cavity, Poiseuille, Couette, BackwardFacingStep])
+def test_walls_continue_the_lattice_of_the_fluid(model):
+    case = model()
+    state, spacing = case.particles(), case.particle_spacing
+    position = state["position"]
+    distance, _ = KDTree(position).query(position, k=2)
+    assert distance[:, 1] == pytest.approx(spacing)
+    solid = state["kind"] == Kind.SOLID
+    assert state["depth"][solid].min() == pytest.approx(spacing / 2)
+    assert (state["depth"][~solid] == 0).all()
+    # Within the support of a fluid particle no place of the lattice is empty, but where fluid enters and leaves.
+    fluid = position[state["kind"] == Kind.FLUID]
+    near = KDTree(position).query_ball_point(fluid, 3.9 * spacing, return_length=True)
+    periodic = "periodic" in str(case.domain())
+    assert near.max() == 45 if periodic else (near == 45).all()
+
+
+@pytest.mark.parametrize("model", [Cavity, Poiseuille, Couette, BackwardFacingStep, PressureJump])
+def test_a_few_steps_stay_sound(model):
+    simulation = model(resolution=10).simulation(threads=1)
+    volume = simulation.counts["fluid"] / 100
+    simulation.advance(60)
+    rows = simulation.history()
+    assert rows["velocity_max"].max() < 1.7
+    assert rows["volume"] == pytest.approx(volume, rel=0.02)
+
+
+def test_lid_slides_and_reaches_over_the_corners():
+    state = Cavity(resolution=20).particles()
+    solid, above = state["kind"] == Kind.SOLID, state["position"][:, 1] > 1
+    assert (state["body"] == (solid & above)).all()
+    assert (state["velocity"][solid & above] == [1, 0]).all()
+    assert (state["velocity"][~above] == 0).all()
+    assert len(Cavity().bodies()) == 2
+
+
+def cavity_flow(position, _):
+    """Return a flow whose centre-line velocities have the extrema of Re = 100, at about their places."""
+    x, y = position.T
+    u = np.where(y < 0.458, -0.214042 * np.sin(np.pi * y / 0.916), -0.214042 + 1.2 * (y - 0.458) ** 2)
+    v = np.where(x < 0.5, 0.179573 * np.sin(2 * np.pi * x), -0.253803 * np.sin(2 * np.pi * (x - 0.5)))
+    return np.stack([u, v], axis=1)
+
+
+def test_cavity_measures_find_the_extrema(tmp_path):
+    case = Cavity(resolution=50)
+    # The first snapshots are of the start, and must not count.
+    run = write_flow(tmp_path / "run", case, lambda x, t: cavity_flow(x, t) * (t > 7), times=(0, 4, 8, 9, 10))
+    measures = case.measures(run)
+    assert [measure.name[:10] for measure in measures] == ["smallest u", "largest v ", "smallest v"]
+    assert [measure.error for measure in measures] == pytest.approx([0, 0, 0], abs=2e-3)
+    assert all(measure.passed and measure.tolerance == 0.01 for measure in measures)
+    u, v = case.profiles(run)
+    assert len(u.reference[0]) == len(v.reference[1]) == 101
+    assert u.reference[1][-1] == 1
+    assert Cavity(reynolds=150).measures(run) == Cavity(reynolds=150).profiles(run) == []
+
+
+@pytest.mark.parametrize(("reynolds", "slack"), [(100, 1e-3), (400, 1e-6), (1000, 1e-2)])
+def test_cavity_profiles_and_extrema_agree(reynolds, slack, tmp_path):
+    case = Cavity(reynolds=reynolds, resolution=10)
+    run = write_flow(tmp_path / "run", case, cavity_flow)
+    (_, u), (_, v) = (profile.reference for profile in case.profiles(run))
+    extrema = [measure.reference for measure in case.measures(run)]
+    assert [u.min(), v.max(), v.min()] == pytest.approx(extrema, rel=slack)
+
+
+@pytest.mark.parametrize(("case", "force"), [(Poiseuille(), 0.8), (Couette(reynolds=50), 0.0)])
+def test_exact_plate_flow_solves_its_equation(case, force):
+    y, step = np.linspace(0.02, 0.98, 49), 1e-3
+    assert case.body_force() == [pytest.approx(force), 0.0]
+    for time in 0.02 * case.reynolds, 0.2 * case.reynolds:
+        rate = (case.profile(y, time + step) - case.profile(y, time - step)) / (2 * step)
+        bend = (case.profile(y + step, time) - 2 * case.profile(y, time) + case.profile(y - step, time)) / step**2
+        assert rate == pytest.approx(bend / case.reynolds + force, abs=1e-4)
+        assert case.profile(np.array([0.0, 1.0]), time) == pytest.approx([0, case.upper_velocity], abs=1e-6)
+    assert case.profile(y, 1e-4 * case.reynolds)[:24] == pytest.approx(0, abs=1e-3)
+    steady = {"poiseuille": 4 * y * (1 - y), "couette": y}[case.name]
+    assert case.profile(y, 10 * case.reynolds) == pytest.approx(steady, abs=1e-9)
+
+
+@pytest.mark.parametrize("model", [Poiseuille, Couette])
+def test_plate_measure_is_the_error_of_the_last_snapshot(model, tmp_path):
+    case = model(resolution=20)
+    run = write_flow(tmp_path / "run", case, lambda x, t: 1.03 * case.exact(x, t)["velocity"] if t else 0 * x)
+    (measure,) = case.measures(run)
+    assert measure.value == pytest.approx(0.03, rel=1e-3)
+    assert not measure.passed
+    (profile,) = case.profiles(run)
+    y, u = profile.computed
+    assert (np.diff(y) >= 0).all()
+    assert u == pytest.approx(1.03 * np.interp(y, *profile.reference), abs=2e-3)
+
+
+@pytest.mark.parametrize("model", [Poiseuille, Couette])
+def test_plate_flow_follows_the_exact_transient(model, tmp_path):
+    case = model(resolution=16)
+    run = case.run(tmp_path / "run", until=1.0, threads=1, progress=False)
+    assert case.measures(run)[0].value < 0.015
+
+
+def test_plates_refuse_a_period_shorter_than_the_support():
+    with pytest.raises(ConfigError, match="length = 0.075: shorter than the kernel's support"):
+        Couette(length=0.075)
+
+
+def test_step_channel():
+    case = BackwardFacingStep()
+    state = case.particles()
+    position = {kind: state["position"][state["kind"] == kind] for kind in Kind}
+    assert len(position[Kind.FLUID]) == (5 * 1 + 20 * 2) * 20**2
+    assert (len(position[Kind.INLET]), len(position[Kind.OUTLET])) == (8 * 20, 8 * 40)
+    assert position[Kind.INLET][:, 0].max() == pytest.approx(-5 - 0.025)
+    assert position[Kind.OUTLET][:, 0].min() == pytest.approx(20 + 0.025)
+    assert position[Kind.SOLID][:, 0].min() < position[Kind.INLET][:, 0].min()
+    assert position[Kind.SOLID][:, 0].max() > position[Kind.OUTLET][:, 0].max()
+    assert case.kinematic_viscosity == case.settings()["kinematic_viscosity"] == 2 / 100
+
+
+@pytest.mark.parametrize("expansion", [1.5, 2.0, 3.0])
+def test_step_starts_with_the_mean_velocity_in_the_inlet_channel(expansion):
+    case = BackwardFacingStep(expansion=expansion)
+    state = case.particles()
+    inlet = state["kind"] == Kind.INLET
+    assert state["velocity"][inlet].mean(axis=0) == pytest.approx([1, 0], abs=6e-3)
+    assert state["velocity"][inlet, 0].max() == pytest.approx(1.5, rel=0.01)
+    outlet = state["kind"] == Kind.OUTLET
+    assert state["velocity"][outlet, 0].mean() == pytest.approx(1 / expansion, rel=2e-3)
+    normal, edge = state["normal"], np.abs(state["position"] - [0, 1]).max(axis=1) < 0.9 * case.particle_spacing
+    assert normal[edge & (state["kind"] == Kind.SOLID)] == pytest.approx(np.sqrt(0.5) * np.ones((1, 2)))
+
+
+def test_step_measure_finds_the_reattachment(tmp_path):
+    case = BackwardFacingStep(resolution=10, downstream=8.0)
+    run = write_flow(
+        tmp_path / "run", case, lambda r, t: np.stack([r[:, 1] * (r[:, 0] - 3.0), 0 * t * r[:, 1]], axis=1)
+    )
+    (measure,) = case.measures(run)
+    assert measure.value == pytest.approx(3.0, abs=1e-3)
+    assert measure.error == pytest.approx(3 / 2.91828 - 1, abs=1e-3)
+    assert measure.passed
+    assert case.replace(reynolds=200).measures(run) == case.replace(upstream=4.0).measures(run) == []
+
+
+def test_last_upward_zero():
+    x = np.arange(5.0)
+    assert last_upward_zero(x, np.array([-1, 1, -1, -1, 3])) == 3.25
+    assert np.isnan(last_upward_zero(x, np.ones(5)))
+
+
+def test_pressure_jump_measures(tmp_path):
+    case = PressureJump(resolution=20)
+    pressure = case.particles()["pressure"]
+    assert pressure.mean() == 0.5
+    run = write_flow(tmp_path / "run", case, lambda x, _: np.full_like(x, [0.1, 1.0]), pressure=0.02 * pressure)
+    jump, energy = case.measures(run)
+    assert jump.value == pytest.approx(0.02)
+    assert energy.value == pytest.approx(8 * 0.5 * 0.1**2)
+
+
+@pytest.mark.parametrize("model", CASES.values())
+def test_measures_of_a_run_without_snapshots_do_not_pass(model, tmp_path):
+    case = model()
+    run = write_flow(tmp_path / "run", case, lambda x, _: 0 * x, times=(1.0,))
+    (tmp_path / "run" / "particles.vtkhdf").unlink()
+    assert not any(measure.passed for measure in case.measures(run))
+
+
+def test_late_velocity_is_exact_for_quadratic_fields(tmp_path):
+    case = Cavity(resolution=10)
+    run = write_flow(tmp_path / "run", case, lambda x, t: t * np.stack([x[:, 0] * x[:, 1], x[:, 1] ** 2], axis=1))
+    points = np.array([[0.5, 0.01], [0.99, 0.5]])
+    expected = 2 * np.stack([points.prod(axis=1), points[:, 1] ** 2], axis=1)
+    assert sampling.late_velocity(run, points) == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", ["cavity_extrema.csv", "step_reattachment.csv", "cylinder_summary.csv"])
+def test_reference_tables_are_complete(name):
+    rows = reference.rows(name)
+    assert rows and all(np.isfinite([float(value) for value in row.values()]).all() for row in rows)
+
+
+SHAPES = [("square_cylinder", 0.0), ("square_cylinder", 30.0), ("naca0012", 0.0), ("naca0012", 10.0)]
+
+
+@pytest.mark.parametrize(("shape", "angle"), SHAPES)
+def test_fluid_flows_around_the_body(shape, angle):
+    case = Body(shape=shape, angle_of_attack=angle, length=5.0, height=4.0, upstream=2.0)
+    state = case.particles()
+    fluid, solid = (state["position"][state["kind"] == kind] - [2, 0] for kind in (Kind.FLUID, Kind.SOLID))
+    assert not shapely.contains_xy(case.outline, *fluid.T).any()
+    assert shapely.contains_xy(case.outline, *solid.T).all()
+    assert len(fluid) == pytest.approx((20 - case.outline.area) * 400, abs=10)
+    angles, points = case.surface_points()
+    assert (np.diff(angles) >= 0).all() and angles[0] >= 0 and angles[-1] < 360
+    assert shapely.distance(case.outline.exterior, shapely.points(points - [2, 0])).max() < 1e-9
+    directions = np.stack([-np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
+    assert (points - [2, 0]) / np.hypot(*(points - [2, 0]).T)[:, None] == pytest.approx(directions, abs=1e-8)
+
+
+def test_square_body_is_symmetric_and_on_the_lattice():
+    state = Body(length=5.0, height=4.0, upstream=2.0).particles()
+    distance, _ = KDTree(state["position"]).query(state["position"] * [1, -1])
+    assert distance.max() < 1e-9
+    distance, _ = KDTree(state["position"]).query(state["position"], k=2)
+    assert distance[:, 1] == pytest.approx(0.05)
+
+
+def test_airfoil_noses_up():
+    outline = Body(shape="naca0012", angle_of_attack=10).outline
+    nose, tail = (outline.exterior.coords[k] for k in (0, 100))
+    assert np.hypot(tail[0] - nose[0], tail[1] - nose[1]) == pytest.approx(1)
+    assert np.degrees(np.arctan2(nose[1] - tail[1], tail[0] - nose[0])) == pytest.approx(10)
+    assert outline.centroid.coords[0] == pytest.approx((0, 0), abs=1e-9)
+
+
+def test_body_from_a_file(tmp_path):
+    path = tmp_path / "wedge.csv"
+    path.write_text("x,y\n0,0\n1,0.2\n1,-0.2\n")
+    body = Body(shape=str(path))
+    assert body.outline.area == pytest.approx(0.2)
+    path.write_text("0 0\n1 0.2\n1 -0.2\n")
+    assert Body(shape=str(path)).outline.equals(body.outline)
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        ("0 0\n1 1\n1 0\n0 1\n", "Self-intersection"),
+        ("0 0\n1 1\n", "three or more"),
+        ("x\n0 a\n", "'a'"),
+        (None, "neither"),
+    ],
+)
+def test_body_refuses_what_is_no_curve(content, problem, tmp_path):
+    path = tmp_path / "curve.csv"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(ConfigError, match=problem):
+        Body(shape=str(path))
+
+
+def test_wide_domain_of_the_cylinder_is_possible():
+    case = Cylinder(height=60.0, upstream=30.0, length=90.0, resolution=8)
+    assert case.domain()["upper"] == [90, 30]
+    assert case.particle_estimate() == pytest.approx(90 * 60 * 64, rel=0.05)
