@@ -93,7 +93,7 @@ def write_run(path: Path, *, end=60.0) -> Path:
 
 
 def write_flow(path: Path, case, velocity, times=(0.0, 1.0, 2.0), pressure=0.0) -> Run:
-    """Write a run folder of `case` with snapshots of its particles where they start and a `velocity` (position, time)."""
+    """Write a run folder of `case` with snapshots of its first particles with a `velocity` (position, time)."""
     folder = RunFolder(path)
     folder.create(Config(case, RunSettings(until=times[-1])))
     (path / "run.json").write_text(json.dumps({"status": "finished", "case": case.name}))
