@@ -70,7 +70,7 @@ def test_cavity_measures_find_the_extrema(tmp_path):
     assert Cavity(reynolds=150).measures(run) == Cavity(reynolds=150).profiles(run) == []
 
 
-@pytest.mark.parametrize(("reynolds", "slack"), [(100, 1e-3), (400, 1e-6), (1000, 1e-2)])
+@pytest.mark.parametrize(("reynolds", "slack"), [(100, 1e-3), (400, 5e-3), (1000, 1e-2)])
 def test_cavity_profiles_and_extrema_agree(reynolds, slack, tmp_path):
     case = Cavity(reynolds=reynolds, resolution=10)
     run = write_flow(tmp_path / "run", case, cavity_flow)
