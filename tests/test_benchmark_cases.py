@@ -178,6 +178,7 @@ def test_measures_of_a_run_without_snapshots_do_not_pass(model, tmp_path):
     run = write_flow(tmp_path / "run", case, lambda x, _: 0 * x, times=(1.0,))
     (tmp_path / "run" / "particles.vtkhdf").unlink()
     assert not any(measure.passed for measure in case.measures(run))
+    case.profiles(run)
 
 
 def test_late_velocity_is_exact_for_quadratic_fields(tmp_path):
@@ -252,6 +253,12 @@ def test_body_refuses_what_is_no_curve(content, problem, tmp_path):
         path.write_text(content)
     with pytest.raises(ConfigError, match=problem):
         Body(shape=str(path))
+
+
+def test_body_refuses_to_touch_the_sides(tmp_path):
+    (tmp_path / "wedge.csv").write_text("0 0\n30 1\n30 -1\n")
+    with pytest.raises(ConfigError, match="leave at least 0.5 D"):
+        Body(shape=str(tmp_path / "wedge.csv"))
 
 
 def test_wide_domain_of_the_cylinder_is_possible():

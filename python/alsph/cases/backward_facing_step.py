@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import shapely
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from alsph import reference, sampling
-from alsph.cases.base import Case
+from alsph.cases.base import WalledCase
 from alsph.geometry import FloatArray, Kind, cell_centres, cells, inside, join, lattice, particles, walls
 from alsph.measures import Measure
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from alsph.results import Run
 
 
-class BackwardFacingStep(Case):
+class BackwardFacingStep(WalledCase):
     """Flow over a backward-facing step of height D in a channel with no-slip walls; U is the mean inflow velocity.
 
     The step's edge lies at x = 0, y = D; the channel behind it reaches from y = 0 to y = ED/(E - 1) with the expansion
@@ -36,10 +36,6 @@ class BackwardFacingStep(Case):
     expansion: float = Field(default=2.0, gt=1, description="height of the outlet channel over the inlet channel's [-]")
     upstream: float = Field(default=5.0, gt=0, description="length of the inlet channel [D]")
     downstream: float = Field(default=20.0, gt=0, description="length of the channel behind the step [D]")
-    # Second order in Δx at straight walls, where the ratio limit of the rule of Morris, Fox and Zhu leaves first order.
-    wall_velocity: Literal["paper", "adami", "morris"] = Field(
-        default="adami", description=Case.model_fields["wall_velocity"].description
-    )
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

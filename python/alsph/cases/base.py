@@ -289,6 +289,18 @@ class Case(Parameters):
         return round(cells)
 
 
+class WalledCase(Case):
+    """A case between straight no-slip walls.
+
+    There the extrapolated wall velocity is second order in Δx; the limited ratio in the rule of Morris, Fox and Zhu
+    lets the fluid slip, which leaves first order.
+    """
+
+    wall_velocity: Literal["paper", "adami", "morris"] = Field(
+        default="adami", description=Case.model_fields["wall_velocity"].description
+    )
+
+
 def _free_memory() -> float:
     """Memory that can be had without swapping [bytes]; infinite where the system does not tell."""
     try:

@@ -2,12 +2,12 @@
 
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 from shapely import affinity
 
 from alsph.cases.channel import Channel
@@ -37,6 +37,16 @@ class Body(Channel):
     def _known(cls, shape: str) -> str:
         _outline(shape)
         return shape
+
+    @model_validator(mode="after")
+    def _fits_in(self) -> Self:
+        left, bottom, right, top = self.outline.bounds
+        room = min(
+            self.upstream + left, self.length - self.upstream - right, bottom + self.height / 2, self.height / 2 - top
+        )
+        if room < 0.5:
+            raise ValueError(f"the body comes within {room:.3g} D of a side of the channel; leave at least 0.5 D")
+        return self
 
     @cached_property
     def outline(self) -> shapely.Polygon:

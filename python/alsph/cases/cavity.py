@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import shapely
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from alsph import reference, sampling
-from alsph.cases.base import Case
+from alsph.cases.base import WalledCase
 from alsph.geometry import FloatArray, Kind, cells, join, particles, walls
 from alsph.measures import Measure, Profile
 
@@ -22,7 +22,7 @@ LINE = np.linspace(0, 1, 401)[1:-1]
 SOURCE = "independent high-order solution (alsph/reference)"
 
 
-class Cavity(Case):
+class Cavity(WalledCase):
     """Flow in a square cavity of side D, driven by its lid at y = D, which slides along x with the velocity U.
 
     The fluid starts from rest and comes to a steady state. Compared are the velocities on the centre lines with
@@ -34,10 +34,6 @@ class Cavity(Case):
     title: ClassVar[str] = "lid-driven cavity"
 
     resolution: int = Field(default=50, ge=8, description="particles per side of the cavity, D/Δx [-]")
-    # Second order in Δx at straight walls, where the ratio limit of the rule of Morris, Fox and Zhu leaves first order.
-    wall_velocity: Literal["paper", "adami", "morris"] = Field(
-        default="adami", description=Case.model_fields["wall_velocity"].description
-    )
 
     @property
     def default_until(self) -> float:

@@ -21,7 +21,7 @@ class Channel(Case):
     body_name: ClassVar[str]
 
     reynolds: float = Field(default=200.0, gt=0, description="Reynolds number UD/ν [-]")
-    resolution: int = Field(default=20, gt=0, description="particles per diameter, D/Δx; at least 8 [-]")
+    resolution: int = Field(default=20, gt=0, description="particles per reference length, D/Δx; at least 8 [-]")
     length: float = Field(default=14.0, gt=0, description="length of the channel [D]")
     height: float = Field(default=13.0, gt=0, description="height of the channel [D]")
     upstream: float = Field(default=4.0, gt=0, description="distance from the inlet to the centre of the body [D]")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import shapely
@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from alsph.analysis import error_norms
-from alsph.cases.base import Case
-from alsph.errors import RunFolderError
+from alsph.cases.base import WalledCase
 from alsph.geometry import FloatArray, Kind, cells, join, particles, walls
 from alsph.measures import Measure, Profile
 
@@ -23,7 +22,7 @@ TERMS = np.arange(1, 401)[:, None]
 """Indices of the terms of the series (400, 1); those that are left out have decayed after t* = 1e-4 Re."""
 
 
-class Plates(Case):
+class Plates(WalledCase):
     """Flow along x between no-slip plates at y = 0 and y = D, periodic along x; it starts from rest."""
 
     upper_velocity: ClassVar[float]
@@ -32,10 +31,6 @@ class Plates(Case):
     reynolds: float = Field(default=10.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=40, ge=8, description="particles between the plates, D/Δx [-]")
     length: float = Field(default=0.5, gt=0, description="period along the plates [D]")
-    # Second order in Δx at straight walls, where the ratio limit of the rule of Morris, Fox and Zhu leaves first order.
-    wall_velocity: Literal["paper", "adami", "morris"] = Field(
-        default="adami", description=Case.model_fields["wall_velocity"].description
-    )
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -94,18 +89,18 @@ class Plates(Case):
 
     def measures(self, run: Run) -> list[Measure]:
         """Return the relative error (L2 over the particles) of the velocity in the last snapshot."""
-        try:
+        error = np.nan
+        if (run.times > 0).any():
             snapshot = run.snapshot()
-        except RunFolderError:  # no snapshot yet
-            error = np.nan
-        else:
-            exact = self.exact(snapshot.position, snapshot.time)["velocity"]
             fluid = snapshot.fluid
-            error = error_norms(snapshot.velocity[fluid], exact[fluid])["l2"] if snapshot.time > 0 else np.nan
+            exact = self.exact(snapshot.position[fluid], snapshot.time)["velocity"]
+            error = error_norms(snapshot.velocity[fluid], exact)["l2"]
         return [Measure("relative L2 error of the velocity", error, 0.0, 0.01, self.source)]
 
     def profiles(self, run: Run) -> list[Profile]:
         """Return the particles' velocities in the last snapshot over their heights."""
+        if not len(run.times):
+            return []
         snapshot = run.snapshot()
         y, u = snapshot.position[snapshot.fluid, 1], snapshot.velocity[snapshot.fluid, 0]
         order, heights = np.argsort(y), np.linspace(0, 1, 201)
