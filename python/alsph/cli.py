@@ -193,16 +193,21 @@ def _plot(
 ) -> None:
     """Draw the figures of a run.
 
-    These are the forces, the pressure coefficient, the history of the run, and fields.
+    These are the ledger of the run, its curves beside their reference, forces, pressure coefficient, and fields.
     """
     run = Run(path)
     field = field or ([] if run.case.get("dimensions") == 3 else ["vorticity", "pressure"])
     for name in field:
         plotting.field_style(name)
     figures = output or path / "figures"
-    drawings: dict[str, Callable[[Path], object]] = {"history": run.plot_history}
+    drawings: dict[str, Callable[[Path], object]] = {
+        profile.file_name: plotting.profile({"computed": profile}).savefig for profile in run.profiles
+    }
+    drawings["ledger"] = run.plot_ledger
     if run.bodies:
-        drawings |= {"forces": run.plot_forces, "pressure_coefficient": run.plot_pressure_coefficient}
+        drawings["forces"] = run.plot_forces
+    if run.config.case.surface_points():
+        drawings["pressure_coefficient"] = run.plot_pressure_coefficient
     drawings |= {name: functools.partial(run.plot_field, name, time) for name in field}
     figures.mkdir(parents=True, exist_ok=True)
     for name, draw in drawings.items():

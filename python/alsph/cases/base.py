@@ -109,6 +109,11 @@ class Case(Parameters):
         """Return ``angle`` (m,) [degrees from the front] and ``position`` (m, d) of the C_p samples."""
         return None
 
+    def fluid_volume(self) -> float:
+        """Return the volume of the space that the fluid fills [D^d]: the domain's; NaN where there are bodies."""
+        domain = self.domain()
+        return math.nan if self.bodies() else math.prod(np.subtract(domain["upper"], domain["lower"]))
+
     def measures(self, run: Run) -> list[Measure]:
         """Return what a run of this case is judged by."""
         return []
