@@ -1,4 +1,4 @@
-"""The command line: ``alsph run | resume | describe | plot | info | cases``.
+"""The command line: ``alsph run | resume | describe | plot | info | cases | validate``.
 
 The options of ``run`` and ``describe`` are the fields of the case and of :class:`alsph.config.RunSettings`.
 """
@@ -22,6 +22,7 @@ from alsph.errors import AlsphError
 from alsph.parameters import Parameters, describe_default
 from alsph.results import Run
 from alsph.run import resume, start
+from alsph.validation import validate
 
 INTERRUPTED = 130
 
@@ -56,7 +57,7 @@ class Commands(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of the commands."""
-        return ["cases", "describe", "run", "resume", "info", "plot"]
+        return ["cases", "describe", "run", "resume", "info", "plot", "validate"]
 
 
 app = typer.Typer(
@@ -213,6 +214,29 @@ def _plot(
     for name, draw in drawings.items():
         draw(figures / f"{name}.png")
         typer.echo(figures / f"{name}.png")
+
+
+@app.command("validate")
+@_exit_codes()
+def _validate(
+    names: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="cases; all if none is given")] = None,
+    full: Annotated[bool, typer.Option("--full/--quick", help="hours, or minutes, on two cores")] = False,
+    resolution: Annotated[
+        list[int] | None, typer.Option(help="resolution D/Δx, may be repeated", show_default="those of the suite")
+    ] = None,
+    threads: Annotated[int | None, typer.Option(help="number of threads", show_default="all cores")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="folder for runs and report")] = Path(
+        "runs/validation"
+    ),
+) -> None:
+    """Run cases at several resolutions and compare them with their references.
+
+    The exit code is 1 if a check fails. Runs are kept in the output folder and used again; a validation that was cut
+    goes on when it is started again.
+    """
+    report = validate(*(names or ()), full=full, resolutions=resolution or (), threads=threads, output=output)
+    typer.echo(f"\n{report}\n{report.path / 'report.md'}")
+    raise typer.Exit(not report.passed)
 
 
 @app.command("info")

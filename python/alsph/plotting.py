@@ -294,25 +294,26 @@ def profile(curves: dict[str, Profile]) -> Figure:
     return figure
 
 
-def convergence(errors: dict[str, tuple[FloatArray, FloatArray]]) -> Figure:
+def convergence(errors: dict[str, dict[int, float]]) -> Figure:
     """Draw the moduli of errors over the resolution, and lines of first and second order.
 
     Parameters
     ----------
     errors : dict
-        Resolutions D/Δx (m,) and errors (m,) by the name of the quantity.
+        The errors of each quantity by resolution D/Δx.
     """
     figure = Figure(figsize=(7, 4.5), layout="constrained")
     axes = figure.subplots()
-    for name, (resolution, error) in errors.items():
-        axes.loglog(resolution, np.abs(error), "o-", label=name)
-    every = np.unique(np.concatenate([resolution for resolution, _ in errors.values()]))
-    top = np.nanmax(np.abs(np.concatenate([error for _, error in errors.values()])))
+    for name, series in errors.items():
+        axes.loglog([*series], np.abs([*series.values()]), "o-", label=name)
+    resolutions = sorted({resolution for series in errors.values() for resolution in series})
+    largest = max(abs(error) for series in errors.values() for error in series.values())
     for order, style in ((1, "k:"), (2, "k--")):
-        axes.loglog(every, top * (every / every[0]) ** -float(order), style, lw=0.8, label=f"order {order}")
+        slope = [largest * (resolutions[0] / resolution) ** order for resolution in resolutions]
+        axes.loglog(resolutions, slope, style, lw=0.8, label=f"order {order}")
     axes.set(xlabel=r"resolution $D/\Delta x$", ylabel="|error|")
-    axes.set_xticks(every, [f"{value:g}" for value in every])
-    axes.minorticks_off()
-    axes.grid(alpha=0.3)
+    axes.set_xticks(resolutions, [str(resolution) for resolution in resolutions])
+    axes.xaxis.minorticks_off()
+    axes.grid(alpha=0.3, which="both")
     axes.legend(fontsize="small")
     return figure
