@@ -36,7 +36,7 @@ class Ledger:
     volume_drift : ndarray, shape (n,)
         Σ V_i of the fluid particles over its value after the first step, less 1.
     volume_error : ndarray, shape (n,)
-        Σ V_i over the volume of the space that the fluid fills, less 1; NaN where the case does not know that volume.
+        Σ V_i over the volume of the space that the fluid fills (`Case.fluid_volume`), less 1.
     kinetic_energy : ndarray, shape (n,)
         E = Σ ½ m_i |u_i|² of the fluid particles [ρU²D^d].
     energy_rate : ndarray, shape (n,)
@@ -115,8 +115,9 @@ def _budget(snapshot: Snapshot, case: Case) -> tuple[float, float]:
     position, velocity, volume = snapshot.position[fluid], snapshot.velocity[fluid], spacing**case.space_dimensions
     gradient = sampling.interpolate(*_with_images(position, velocity, case), position, spacing)[1]
     strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
-    force = np.array(case.settings()["body_force"])
-    return 2 / case.reynolds * volume * float((strain**2).sum()), volume * float((velocity @ force).sum())
+    settings = case.settings()
+    power = (velocity @ np.array(settings["body_force"])).sum()
+    return 2 * settings["kinematic_viscosity"] * volume * float((strain**2).sum()), volume * float(power)
 
 
 def _with_images(position: FloatArray, velocity: FloatArray, case: Case) -> tuple[FloatArray, FloatArray]:

@@ -315,5 +315,5 @@ def convergence(errors: dict[str, dict[int, float]]) -> Figure:
     axes.set_xticks(resolutions, [str(resolution) for resolution in resolutions])
     axes.xaxis.minorticks_off()
     axes.grid(alpha=0.3, which="both")
-    axes.legend(fontsize="small")
+    figure.legend(loc="outside lower center", ncols=2, fontsize="small", frameon=False)
     return figure

@@ -319,7 +319,7 @@ def _draw(entry: Entry, runs: list[Run], rows: list[Row], path: Path) -> dict[st
     """Draw each profile at all resolutions, and the errors over the resolution; return file names and titles."""
     figures: dict[str, Figure] = {}
     profiles = {f"D/Δx = {run.case['resolution']}": run.profiles for run in runs}
-    for same in zip(*profiles.values(), strict=True):
+    for same in zip(*profiles.values(), strict=False):
         figures[same[0].file_name] = plotting.profile(dict(zip(profiles, same, strict=True)))
     errors: dict[str, dict[int, float]] = {}
     for row in rows:

@@ -54,6 +54,12 @@ def unconfined_cylinder(reynolds: float) -> Reference | None:
     return Reference(results, "Qu, Norberg, Davidson, Peng and Wang (2013)") if results else None
 
 
+def rows(name: str) -> list[dict[str, str]]:
+    """Return the rows of a CSV file of this folder by column."""
+    with (FOLDER / name).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
 def table(name: str) -> FloatArray:
     """Return the columns (k, n) of a file of numbers with one line of header."""
     return np.loadtxt(FOLDER / name, delimiter=",", skiprows=1, unpack=True)
@@ -61,6 +67,5 @@ def table(name: str) -> FloatArray:
 
 def _results(name: str, reynolds: float) -> dict[str, float] | None:
     """Return the values in the row of a Reynolds number, None where there is no such row."""
-    with (FOLDER / name).open(encoding="utf-8", newline="") as file:
-        row = next((row for row in csv.DictReader(file) if float(row["Re"]) == reynolds), None)
+    row = next((row for row in rows(name) if float(row["Re"]) == reynolds), None)
     return {name: float(row[column]) for name, column in COLUMNS.items() if column in row} if row else None
