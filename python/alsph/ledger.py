@@ -49,7 +49,7 @@ class Ledger:
     power : ndarray, shape (k,)
         Work of the body force and of moving walls on the fluid in unit time [ρU³D^(d-1)].
     imbalance : ndarray, shape (k,)
-        energy_rate + dissipation - power [ρU³D^(d-1)].
+        energy_rate + dissipation - power [ρU³D^(d-1)]; large where gradients are not resolved, as at a lid's corners.
     """
 
     time: FloatArray

@@ -107,7 +107,7 @@ class Row:
             measure.name,
             f"{measure.value:.5g}",
             f"{measure.reference:.5g}",
-            f"{100 * measure.error:+.2f} %",
+            f"{100 * measure.error:+.3g} %",
             f"{100 * measure.tolerance:g} %",
             "" if np.isnan(self.order) else f"{self.order:.1f}",
             ("pass" if measure.passed else "FAIL") if self.judged else "",
