@@ -7,7 +7,7 @@ EXTENSION := python/alsph/_alsph.abi3.so
 SOURCES := Cargo.toml Cargo.lock pyproject.toml $(shell find rust -name '*.rs')
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: build run test test-rust test-python bench clean
+.PHONY: build run test test-rust test-python validate bench clean
 
 build: $(EXTENSION)
 
@@ -28,6 +28,9 @@ test-python: $(EXTENSION)
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/pytest
+
+validate: $(EXTENSION)  ## Cases beside their reference solutions, in about a minute on two cores.
+	$(BIN)/alsph validate
 
 bench:
 	cargo bench

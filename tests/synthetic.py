@@ -11,6 +11,7 @@ from alsph.results import Run
 
 DRAG, DRAG_SWING, LIFT, STROUHAL, CIRCULATION = 1.48, 0.05, 0.75, 0.21, 1.0
 SHED = 2 * np.pi * STROUHAL
+SHORT = Cylinder(reynolds=200, resolution=10, length=8.0, height=8.0)
 
 
 def signals(time, *, growth=12.0, noise=0.0, strouhal=STROUHAL, seed=0):
@@ -76,9 +77,8 @@ def particles(case):
     }
 
 
-def write_run(path: Path, *, end=60.0) -> Path:
+def write_run(path: Path, case=SHORT, *, end=60.0) -> Path:
     """Write a run folder of shedding up to tU/D = `end`, with snapshots every 10 D/U."""
-    case = Cylinder(reynolds=200, resolution=10, length=8.0, height=8.0)
     folder = RunFolder(path)
     folder.create(Config(case, RunSettings(until=end)))
     (path / "run.json").write_text(json.dumps({"status": "finished", "case": "cylinder"}))

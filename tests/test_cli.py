@@ -26,7 +26,7 @@ def test_end_to_end(alsph, tmp_path, small_options):
 
     code, stdout, _ = alsph("plot", run, "--time", 0.1)
     assert code == 0
-    for name in ("forces", "pressure_coefficient", "history", "vorticity", "pressure"):
+    for name in ("forces", "pressure_coefficient", "ledger", "vorticity", "pressure"):
         assert str(run / "figures" / f"{name}.png") in stdout
         assert (run / "figures" / f"{name}.png").stat().st_size > 1000
 
@@ -76,7 +76,10 @@ def test_help_teaches_every_parameter(alsph, case, command):
 def test_plot_in_3d_draws_what_it_can(alsph, tmp_path):
     run = tmp_path / "run"
     assert alsph("run", "taylor_green", "--dimensions=3", "--resolution=8", "--until=0.01", "-o", run)[0] == 0
-    assert alsph("plot", run)[:2] == (0, f"{run / 'figures' / 'history.png'}\n")
+    assert alsph("plot", run)[:2] == (
+        0,
+        f"{run / 'figures' / 'kinetic_energy.png'}\n{run / 'figures' / 'ledger.png'}\n",
+    )
     assert "2-D only" in alsph("plot", run, "--field", "pressure")[2]
 
 

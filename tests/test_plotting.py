@@ -86,13 +86,13 @@ def test_figures_of_a_run_that_has_just_begun(run, tmp_path):
     for name in ("case.toml", "run.json"):
         (tmp_path / name).write_bytes((run.path / name).read_bytes())
     begun = Run(tmp_path)
-    for figure in (begun.plot_forces(), begun.plot_history(), begun.plot_pressure_coefficient()):
+    for figure in (begun.plot_forces(), begun.plot_ledger(), begun.plot_pressure_coefficient()):
         assert isinstance(figure, Figure)
         figure.savefig(tmp_path / "figure.png")
     empty = PressureCoefficient(np.array([0.0, 90.0]), np.full(2, np.nan), np.full(2, np.nan), 0)
     plotting.pressure_coefficient(empty).savefig(tmp_path / "figure.png")
 
 
-def test_history_and_no_global_state(run, tmp_path):
-    assert len(run.plot_history(tmp_path / "history.png").axes) == 5
+def test_ledger_and_no_global_state(run, tmp_path):
+    assert len(run.plot_ledger(tmp_path / "ledger.png").axes) == 8
     assert "matplotlib.pyplot" not in sys.modules

@@ -19,8 +19,9 @@ from alsph import cases, errors
 from alsph.results import Run
 from alsph.run import resume
 from alsph.simulation import Simulation
+from alsph.validation import validate
 
 open_run = Run
 """Open a run folder: ``alsph.open_run("runs/re200")``."""
 
-__all__ = ["Run", "Simulation", "__version__", "cases", "errors", "open_run", "resume"]
+__all__ = ["Run", "Simulation", "__version__", "cases", "errors", "open_run", "resume", "validate"]

@@ -336,3 +336,11 @@ def decay_rate(time: FloatArray, energy: FloatArray) -> Estimate:
         return Estimate(np.nan, note="a decay rate needs three or more positive values")
     slope, error = _slope(time, np.log(energy))
     return Estimate(-slope, error)
+
+
+def observed_order(resolution: tuple[float, float], error: tuple[float, float]) -> float:
+    """Order of convergence p in |error| ~ Δx^p between two resolutions D/Δx; NaN where an error is zero or missing."""
+    coarse, fine = np.abs(error)
+    if not (coarse > 0 and fine > 0):
+        return np.nan
+    return float(np.log(coarse / fine) / np.log(resolution[1] / resolution[0]))

@@ -1,4 +1,4 @@
-"""The command line: ``alsph run | resume | describe | plot | info | cases``.
+"""The command line: ``alsph run | resume | describe | plot | info | cases | validate``.
 
 The options of ``run`` and ``describe`` are the fields of the case and of :class:`alsph.config.RunSettings`.
 """
@@ -22,6 +22,7 @@ from alsph.errors import AlsphError
 from alsph.parameters import Parameters, describe_default
 from alsph.results import Run
 from alsph.run import resume, start
+from alsph.validation import validate
 
 INTERRUPTED = 130
 
@@ -56,7 +57,7 @@ class Commands(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of the commands."""
-        return ["cases", "describe", "run", "resume", "info", "plot"]
+        return ["cases", "describe", "run", "resume", "info", "plot", "validate"]
 
 
 app = typer.Typer(
@@ -195,21 +196,49 @@ def _plot(
 ) -> None:
     """Draw the figures of a run.
 
-    These are the forces, the pressure coefficient, the history of the run, and fields.
+    These are the ledger of the run, its curves beside their reference, forces, pressure coefficient, and fields.
     """
     run = Run(path)
     field = field or ([] if run.case.get("dimensions") == 3 else ["vorticity", "pressure"])
     for name in field:
         plotting.field_style(name)
     figures = output or path / "figures"
-    drawings: dict[str, Callable[[Path], object]] = {"history": run.plot_history}
+    drawings: dict[str, Callable[[Path], object]] = {
+        profile.file_name: plotting.profile({"computed": profile}).savefig for profile in run.profiles
+    }
+    drawings["ledger"] = run.plot_ledger
     if run.bodies:
-        drawings |= {"forces": run.plot_forces, "pressure_coefficient": run.plot_pressure_coefficient}
+        drawings["forces"] = run.plot_forces
+    if run.config.case.surface_points():
+        drawings["pressure_coefficient"] = run.plot_pressure_coefficient
     drawings |= {name: functools.partial(run.plot_field, name, time) for name in field}
     figures.mkdir(parents=True, exist_ok=True)
     for name, draw in drawings.items():
         draw(figures / f"{name}.png")
         typer.echo(figures / f"{name}.png")
+
+
+@app.command("validate")
+@_exit_codes()
+def _validate(
+    names: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="cases; all if none is given")] = None,
+    full: Annotated[bool, typer.Option("--full/--quick", help="hours, or minutes, on two cores")] = False,
+    resolution: Annotated[
+        list[int] | None, typer.Option(help="resolution D/Δx, may be repeated", show_default="those of the suite")
+    ] = None,
+    threads: Annotated[int | None, typer.Option(help="number of threads", show_default="all cores")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="folder for runs and report")] = Path(
+        "runs/validation"
+    ),
+) -> None:
+    """Run cases at several resolutions and compare them with their references.
+
+    The exit code is 1 if a check fails. Runs are kept in the output folder and used again; a validation that was cut
+    goes on when it is started again.
+    """
+    report = validate(*(names or ()), full=full, resolutions=resolution or (), threads=threads, output=output)
+    typer.echo(f"\n{report}\n{report.path / 'report.md'}")
+    raise typer.Exit(not report.passed)
 
 
 @app.command("info")

@@ -1,5 +1,7 @@
 """What a run is judged by: numbers and profiles beside their reference values."""
 
+import math
+import re
 from dataclasses import dataclass
 
 from alsph.geometry import FloatArray
@@ -16,7 +18,7 @@ class Measure:
     value : float
         As computed; NaN where the run does not tell.
     reference : float
-        As it should be; zero for an error norm.
+        As it should be; zero for an error norm, NaN where that is not known.
     tolerance : float
         Largest error that passes.
     source : str
@@ -25,9 +27,9 @@ class Measure:
 
     name: str
     value: float
-    reference: float
-    tolerance: float
-    source: str
+    reference: float = math.nan
+    tolerance: float = math.nan
+    source: str = ""
 
     @property
     def error(self) -> float:
@@ -61,3 +63,8 @@ class Profile:
     computed: tuple[FloatArray, FloatArray]
     reference: tuple[FloatArray, FloatArray]
     source: str
+
+    @property
+    def file_name(self) -> str:
+        """Name of the file, without suffix, that its figure is saved in."""
+        return "_".join(re.findall(r"\w+", self.name.lower()))

@@ -18,12 +18,11 @@ from alsph.reading import Snapshot
 
 if TYPE_CHECKING:
     from alsph.analysis import Window
+    from alsph.ledger import Ledger
+    from alsph.measures import Profile
     from alsph.results import PressureCoefficient, Run
 
 PIXELS_PER_SPACING = 2
-HISTORY_COLUMNS = (
-    "divergence_max divergence_mean iterations time_step velocity_max volume fluid mass_in mass_out".split()
-)
 TIME_LABEL = "$tU/D$"
 
 
@@ -175,8 +174,8 @@ def _finish(axes: Axes, window: Window, *, legend: bool = True) -> None:
         label = f"averaged ({window.periods} periods)" if window.periods else "averaged"
         axes.axvspan(window.start, window.end, color="0.92", zorder=0, label=label)
     axes.grid(alpha=0.3)
-    if legend:
-        axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=4, frameon=False, fontsize="small", borderpad=0)
+    if legend and axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=5, frameon=False, fontsize="small", borderpad=0)
 
 
 def _robust_limits(axes: Axes, time: FloatArray, values: FloatArray) -> None:
@@ -225,30 +224,96 @@ def pressure_coefficient(
     return figure
 
 
-def history(run: Run) -> Figure:
-    """Divergence, inner iterations, time step, largest velocity and the balance of mass over time."""
-    columns = {name: run.history.get(name, np.empty(0)) for name in HISTORY_COLUMNS}
-    start = {name: values[0] if values.size else 1.0 for name, values in columns.items()}
-    panels: dict[str, dict[str, FloatArray]] = {
-        r"$|\nabla\cdot\mathbf{u}|\,D/U$": {"largest": columns["divergence_max"], "mean": columns["divergence_mean"]},
-        "iterations": {"inner iterations of a step": columns["iterations"]},
-        r"$\Delta tU/\Delta x$": {"time step": columns["time_step"] / run.spacing},
-        "$u_{max}/U$": {"largest velocity": columns["velocity_max"]},
-        "relative change": {
-            "volume": columns["volume"] / start["volume"] - 1,
-            "fluid particles": columns["fluid"] / start["fluid"] - 1,
-            "mass in - out": (columns["mass_in"] - columns["mass_out"]) / start["volume"],
-        },
-    }
-    figure = Figure(figsize=(9, 9.5), layout="constrained")
-    for axes, (label, curves) in zip(figure.subplots(len(panels), 1, sharex=True), panels.items(), strict=True):
+def ledger(run: Run) -> Figure:
+    """Divergence and the solver's effort on the left; volume, mass and kinetic energy with its budget on the right."""
+    ledger, history = run.ledger, run.history
+    empty = np.empty(0)
+    fluid, mass = history.get("fluid", empty), history.get("mass_in", empty) - history.get("mass_out", empty)
+    panels: list[tuple[str, dict[str, FloatArray]]] = [
+        (r"$|\nabla\cdot\mathbf{u}|\,D/U$", {"largest": ledger.divergence_max, "mean": ledger.divergence_mean}),
+        ("relative change", {"volume": ledger.volume_drift, "volume over exact": ledger.volume_error}),
+        ("iterations", {"inner iterations of a step": ledger.iterations}),
+        (
+            "relative change",
+            {"fluid particles": fluid / fluid[:1] - 1, "mass in - out": mass / history.get("volume", empty)[:1]},
+        ),
+        (r"$\Delta tU/\Delta x$", {"time step": history.get("time_step", empty) / run.spacing}),
+        (r"$E\,/\,\rho U^2D^d$", {"kinetic energy": ledger.kinetic_energy}),
+        ("$u_{max}/U$", {"largest velocity": history.get("velocity_max", empty)}),
+        (r"$\dot E\,/\,\rho U^3D^{d-1}$", {}),
+    ]
+    figure = Figure(figsize=(12, 8.5), layout="constrained")
+    grid = figure.subplots(4, 2, sharex=True)
+    for axes, (label, curves) in zip(grid.flat, panels, strict=True):
         for name, values in curves.items():
             axes.plot(run.history["time"], values, lw=0.8, label=name)
         axes.set_ylabel(label)
-        if "nabla" in label:
+        if not curves:
+            _energy_budget(axes, run.ledger)
+        elif "nabla" in label:
             axes.set_yscale("log")
         elif "change" not in label:
             axes.set_ylim(0, 1.1 * axes.dataLim.ymax if run.history["time"].size else None)
         _finish(axes, run.window)
-    axes.set_xlabel(TIME_LABEL)
+    for axes in grid[-1]:
+        axes.set_xlabel(TIME_LABEL)
+    return figure
+
+
+def _energy_budget(axes: Axes, ledger: Ledger) -> None:
+    """Rate of change of the kinetic energy, and at the snapshots what it is made of."""
+    if not np.isfinite(ledger.dissipation).any():
+        axes.text(0.5, 0.5, "no budget: energy enters or leaves with the fluid", ha="center", transform=axes.transAxes)
+        return
+    axes.plot(ledger.time, ledger.energy_rate, lw=0.8, label="dE/dt")
+    for label, values, style in (
+        ("- dissipation", -ledger.dissipation, "v"),
+        ("power", ledger.power, "^"),
+        ("imbalance", ledger.imbalance, "kx"),
+    ):
+        axes.plot(ledger.snapshot_time, values, style, ms=4, label=label)
+
+
+def profile(curves: dict[str, Profile]) -> Figure:
+    """Draw computed curves over the reference curve.
+
+    Parameters
+    ----------
+    curves : dict
+        The same profile of one run or several, by name; the last one's reference is drawn.
+    """
+    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    axes = figure.subplots()
+    for name, curve in curves.items():
+        axes.plot(*curve.computed, lw=1.2, label=name)
+    axes.plot(*curve.reference, "k:", lw=1.5, label=f"reference: {curve.source}")
+    axes.set(xlabel=curve.axes[0], ylabel=curve.axes[1])
+    axes.set_title(curve.name, fontsize="medium")
+    axes.grid(alpha=0.3)
+    axes.legend()
+    return figure
+
+
+def convergence(errors: dict[str, dict[int, float]]) -> Figure:
+    """Draw the moduli of errors over the resolution, and lines of first and second order.
+
+    Parameters
+    ----------
+    errors : dict
+        The errors of each quantity by resolution D/Δx.
+    """
+    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    axes = figure.subplots()
+    for name, series in errors.items():
+        axes.loglog([*series], np.abs([*series.values()]), "o-", label=name)
+    resolutions = sorted({resolution for series in errors.values() for resolution in series})
+    largest = max(abs(error) for series in errors.values() for error in series.values())
+    for order, style in ((1, "k:"), (2, "k--")):
+        slope = [largest * (resolutions[0] / resolution) ** order for resolution in resolutions]
+        axes.loglog(resolutions, slope, style, lw=0.8, label=f"order {order}")
+    axes.set(xlabel=r"resolution $D/\Delta x$", ylabel="|error|")
+    axes.set_xticks(resolutions, [str(resolution) for resolution in resolutions])
+    axes.xaxis.minorticks_off()
+    axes.grid(alpha=0.3, which="both")
+    figure.legend(loc="outside lower center", ncols=2, fontsize="small", frameon=False)
     return figure

@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from alsph import analysis, plotting, reading, reference, sampling
+from alsph import analysis, plotting, reading, sampling
 from alsph.analysis import Estimate, Window
+from alsph.config import Config
 from alsph.errors import ConfigError, RunFolderError
 from alsph.geometry import FloatArray
+from alsph.io import RunFolder
+from alsph.ledger import Ledger
+from alsph.measures import Measure, Profile
 from alsph.progress import duration
 from alsph.reading import Snapshot
-from alsph.reference import Reference
 
 
 @dataclass(frozen=True)
@@ -110,9 +113,24 @@ class Run:
         return 1.0 / float(self.case["resolution"])
 
     @cached_property
-    def reference(self) -> Reference | None:
-        """Independent reference solution of the same flow, None where alsph has none."""
-        return reference.find(self.case)
+    def config(self) -> Config:
+        """The case and the settings of the run, as the objects that :attr:`case` was written from."""
+        return RunFolder(self.path).config()
+
+    @cached_property
+    def measures(self) -> list[Measure]:
+        """What the run is judged by: numbers beside their reference values."""
+        return self.config.case.measures(self)
+
+    @cached_property
+    def profiles(self) -> list[Profile]:
+        """Curves of the run beside their reference curves."""
+        return self.config.case.profiles(self)
+
+    @cached_property
+    def ledger(self) -> Ledger:
+        """How incompressible the flow stayed, and where its kinetic energy went."""
+        return Ledger.of(self)
 
     @cached_property
     def history(self) -> dict[str, FloatArray]:
@@ -248,7 +266,7 @@ class Run:
         return sampling.control_volume(*fields, box, self.spacing, 1.0, viscosity)
 
     def summary(self) -> dict[str, Any]:
-        """Return the run's main results by name, each followed by its reference value where there is one.
+        """Return the run's main results by name, its measures each followed by the reference value where there is one.
 
         ``str()`` of each value is fit to be read.
         """
@@ -268,30 +286,14 @@ class Run:
             "averaging rule": self.window.rule,
         }
         if self.bodies:
-            results |= {
-                "shedding periods": self.window.periods,
-                "mean drag coefficient": self.drag.mean,
-                "mean drag coefficient, pressure part": self.drag.pressure,
-                "mean drag coefficient, viscous part": self.drag.viscous,
-                "rms lift coefficient": self.lift.rms,
-                "lift coefficient amplitude": self.lift.amplitude,
-                "Strouhal number": self.strouhal,
-            }
-        if self.case.get("case") == "taylor_green":
-            rate = analysis.decay_rate(self.history["time"], self.history.get("kinetic_energy", np.empty(0)))
-            results["decay rate of the kinetic energy, U/D"] = rate
+            results["shedding periods"] = self.window.periods
         results["mean velocity divergence, |∇·u| D/U"] = self.divergence.mean
-        return self._with_reference({name: value for name, value in results.items() if value != ""})
-
-    def _with_reference(self, results: dict[str, Any]) -> dict[str, Any]:
-        """Put the reference values beside the results of the same name."""
-        expected = self.reference.results if self.reference else {}
-        rows: dict[str, Any] = {}
-        for name, value in results.items():
-            rows[name] = value
-            if name in expected:
-                rows[f"{name}, reference"] = Estimate(expected[name])
-        return rows
+        for measure in self.measures:
+            value = measure.value
+            results[measure.name] = value if isinstance(value, Estimate) else Estimate(value)
+            if np.abs(measure.reference) > 0:
+                results[f"{measure.name}, reference"] = Estimate(measure.reference)
+        return {name: value for name, value in results.items() if value != ""}
 
     def _capped(self) -> Estimate:
         """Percentage of the steps that the iteration cap ended, not the tolerance."""
@@ -332,15 +334,16 @@ class Run:
     ) -> Figure:
         """Figure of C_p(θ) and a reference curve (θ in degrees, C_p); saved if `path` is given.
 
-        Without a `reference`, that of :attr:`reference` is drawn where there is one.
+        Without a `reference`, that of :attr:`profiles` is drawn where there is one.
         """
-        if reference is None and self.reference:
-            reference = self.reference.pressure_coefficient
+        if reference is None:
+            known = (profile.reference for profile in self.profiles if profile.name == "pressure coefficient")
+            reference = next(known, None)
         return _saved(plotting.pressure_coefficient(self.pressure_coefficient, reference), path)
 
-    def plot_history(self, path: str | Path | None = None) -> Figure:
-        """Figure of divergence, iterations, time step and mass over time; saved if `path` is given."""
-        return _saved(plotting.history(self), path)
+    def plot_ledger(self, path: str | Path | None = None) -> Figure:
+        """Figure of divergence, iterations, time step, volume, mass and energy over time; saved if `path` is given."""
+        return _saved(plotting.ledger(self), path)
 
     def __repr__(self) -> str:
         """Name the folder, the case, the status and the time reached."""

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from alsph.results import Run
 
 NEIGHBOURS_PER_DIMENSION = 8
+SINGULAR = 1e-5  # directions that the neighbours determine less well than this are left out of a fit
 VOID = 1.5  # points further than this many Δx from every particle have no value
 
 
@@ -72,7 +73,9 @@ def interpolate(
     first, second = np.triu_indices(points.shape[1])
     basis = np.concatenate([np.ones_like(weight), offset, offset[..., first] * offset[..., second]], axis=-1)
     moments = np.swapaxes(basis, 1, 2) @ (weight * basis)
-    coefficients = np.linalg.pinv(moments, hermitian=True) @ (np.swapaxes(basis, 1, 2) @ (weight * values[index]))
+    coefficients = np.linalg.pinv(moments, SINGULAR, hermitian=True) @ (
+        np.swapaxes(basis, 1, 2) @ (weight * values[index])
+    )
     return coefficients[:, 0], np.swapaxes(coefficients[:, 1 : points.shape[1] + 1], 1, 2) / spacing
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from alsph.errors import ConfigError
-from alsph.geometry import FloatArray, Problem
+from alsph.geometry import FloatArray, Kind, Problem
 from alsph.measures import Measure, Profile
 from alsph.parameters import Parameters
 
@@ -121,6 +121,11 @@ class Case(Parameters):
     def surface_points(self) -> tuple[FloatArray, FloatArray] | None:
         """Return ``angle`` (m,) [degrees from the front] and ``position`` (m, d) of the C_p samples."""
         return None
+
+    def fluid_volume(self) -> float:
+        """Return the volume of the space that the fluid fills [D^d]: that of the cells it is put in at first."""
+        count = np.count_nonzero(self.particles()["kind"] == Kind.FLUID)
+        return float(count * self.particle_spacing**self.space_dimensions)
 
     def measures(self, run: Run) -> list[Measure]:
         """Return what a run of this case is judged by."""

@@ -1,14 +1,25 @@
 """Flow past a circular cylinder in a channel with free-slip walls: the problem of Kolukisa et al. (2021)."""
 
-from typing import ClassVar
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from alsph import reference
 from alsph.cases.channel import Channel
 from alsph.geometry import FloatArray, Solid, cylinder_rings
+from alsph.measures import Measure, Profile
+from alsph.reference import Reference
+
+if TYPE_CHECKING:
+    from alsph.results import Run
 
 RADIUS = 0.5
+FAR = {"height": 60.0, "upstream": 15.0}
+"""Dimensions [D] from which on the sides no longer act on the cylinder."""
 
 
 class Cylinder(Channel):
@@ -39,3 +50,48 @@ class Cylinder(Channel):
         angle = np.arange(0.0, 360.0, 5.0)
         radians = np.radians(angle)
         return angle, self.centre + RADIUS * np.stack([-np.cos(radians), np.sin(radians)], axis=1)
+
+    def fluid_volume(self) -> float:
+        """Return the area of the channel without the cylinder."""
+        return self.length * self.height - math.pi * RADIUS**2
+
+    def measures(self, run: Run) -> list[Measure]:
+        """Return forces and Strouhal number, and the error of the pressure coefficient where its curve is known."""
+        known = self._reference() or Reference({}, "")
+        computed = {
+            "mean drag coefficient": (run.drag.mean, 0.02),
+            "mean drag coefficient, pressure part": (run.drag.pressure, 0.03),
+            "mean drag coefficient, viscous part": (run.drag.viscous, 0.03),
+            "rms lift coefficient": (run.lift.rms, 0.05),
+            "lift coefficient amplitude": (run.lift.amplitude, 0.05),
+            "Strouhal number": (run.strouhal, 0.01),
+        }
+        measures = [
+            Measure(name, value, known.results.get(name, math.nan), tolerance, known.source)
+            for name, (value, tolerance) in computed.items()
+        ]
+        for profile in self.profiles(run):
+            (angle, mean), expected = profile.computed, np.interp(profile.computed[0], *profile.reference)
+            error = np.abs(mean - expected)[angle > 10].max()
+            name = "largest error of the pressure coefficient beyond 10 degrees"
+            measures.append(Measure(name, float(error), 0.0, 0.05, profile.source))
+        return measures
+
+    def profiles(self, run: Run) -> list[Profile]:
+        """Return the mean pressure coefficient over the angle, the mean of both sides, where its curve is known."""
+        known, found = self._reference(), run.pressure_coefficient
+        if known is None or known.pressure_coefficient is None or not found.theta.size:
+            return []
+        upper = found.theta <= 180
+        lower = np.interp(360 - found.theta[upper], found.theta, found.mean, period=360)
+        computed = found.theta[upper], (found.mean[upper] + lower) / 2
+        axes = r"$\theta$ from the front stagnation point [degrees]", "$C_p$"
+        return [Profile("pressure coefficient", axes, computed, known.pressure_coefficient, known.source)]
+
+    def _reference(self) -> Reference | None:
+        """Return the independent solution of this flow, None where there is none."""
+        if (self.length, self.height, self.upstream) == (14.0, 13.0, 4.0):
+            return reference.cylinder_in_channel(self.reynolds)
+        if all(getattr(self, name) >= least for name, least in FAR.items()):
+            return reference.unconfined_cylinder(self.reynolds)
+        return None

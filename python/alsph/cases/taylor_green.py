@@ -1,14 +1,24 @@
 """Decaying Taylor-Green vortices in a periodic box, with their exact solution in 2-D."""
 
-from typing import Any, ClassVar, Literal
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from alsph import analysis, reference
 from alsph.cases.base import Case
 from alsph.errors import ConfigError
 from alsph.geometry import FloatArray, Kind, cell_centres, lattice, particles
+from alsph.measures import Measure, Profile
+
+if TYPE_CHECKING:
+    from alsph.results import Run
+
+EARLY = 0.05
+"""Time [D/U] up to which the transfer to smaller vortices adds less than 0.5 % to the decay rate in 3-D."""
 
 
 class TaylorGreen(Case):
@@ -88,3 +98,58 @@ class TaylorGreen(Case):
         x, y, z = 2 * np.pi * position.T
         velocity = np.stack([np.sin(x) * np.cos(y), -np.cos(x) * np.sin(y), 0 * z], axis=1) * np.cos(z)[:, None]
         return {"velocity": velocity, "pressure": (np.cos(2 * x) + np.cos(2 * y)) * (np.cos(2 * z) + 2) / 16}
+
+    def measures(self, run: Run) -> list[Measure]:
+        """Return the decay rate of the kinetic energy and, where the solution is known, the error of the field.
+
+        In 2-D the rate is 4νk² at all times, with k = 2π/D. In 3-D it is 6νk² at first, since the initial velocity is
+        an eigenfunction of the Laplacian and convection keeps the energy. Vortex stretching then raises it, by a factor
+        of 1 + 5/36 (kUt)² where viscosity does not yet count (Taylor and Green, Proc. R. Soc. A 158, 499, 1937); so the
+        rate is taken over 0.05 D/U only.
+        """
+        time, energy = run.history["time"], run.history.get("kinetic_energy", np.empty(0))
+        if self.dimensions == 2:
+            rate = analysis.decay_rate(time, energy)
+            return [
+                Measure("decay rate of the kinetic energy, U/D", rate, self._decay_rate, 0.01, "exact solution"),
+                Measure("error of the velocity at the last output, L1", self._error(run), 0.0, 0.01, "exact solution"),
+            ]
+        rate = analysis.decay_rate(time[time <= EARLY], energy[time <= EARLY])
+        name = "initial decay rate of the kinetic energy, U/D"
+        measures = [Measure(name, rate, self._decay_rate, 0.03, "exact initial rate")]
+        for profile in self.profiles(run) if time.size else ():
+            known, expected = profile.reference
+            error = (
+                np.abs(np.interp(known, time, energy) - expected).max(where=known >= time[0], initial=0) / expected[0]
+            )
+            name = "largest error of the kinetic energy over its start"
+            measures.append(Measure(name, float(error), 0.0, 0.02, profile.source))
+        return measures
+
+    def profiles(self, run: Run) -> list[Profile]:
+        """Return the kinetic energy over time, where it is known."""
+        time = run.history["time"]
+        if self.dimensions == 2:
+            exact = time, 0.25 * np.exp(-self._decay_rate * time)
+            source = "exact solution"
+        elif self.reynolds == 100:
+            known, energy, _ = reference.table("taylor_green_3d_Re100.csv")
+            reached = known <= time.max(initial=0.0)
+            exact = known[reached], energy[reached]
+            source = "Fourier spectral method"
+        else:
+            return []
+        computed = time, run.history.get("kinetic_energy", np.empty(0))
+        return [Profile("kinetic energy", ("$tU/D$", r"$E\,/\,\rho U^2 D^d$"), computed, exact, source)]
+
+    @property
+    def _decay_rate(self) -> float:
+        """Exact decay rate of the kinetic energy [U/D]: at all times in 2-D, at first in 3-D."""
+        return float(2 * self.dimensions * (2 * np.pi) ** 2 / self.reynolds)
+
+    def _error(self, run: Run) -> float:
+        """Mean modulus of the error of the velocity over that of the velocity, at the last output."""
+        if not run.times.size:
+            return float("nan")
+        last = run.snapshot()
+        return analysis.error_norms(last.velocity, self.exact(last.position, last.time)["velocity"])["l1"]

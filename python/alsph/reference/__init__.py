@@ -3,15 +3,20 @@
 import csv
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from alsph.geometry import FloatArray
 
 FOLDER = Path(__file__).parent
-CHANNEL = {"case": "cylinder", "length": 14.0, "height": 13.0, "upstream": 4.0}
-COLUMNS = {"mean drag coefficient": "CD_mean", "rms lift coefficient": "CL_rms", "Strouhal number": "St_fD_over_U"}
+COLUMNS = {
+    "mean drag coefficient": "CD_mean",
+    "mean drag coefficient, pressure part": "CDp",
+    "mean drag coefficient, viscous part": "CDf",
+    "rms lift coefficient": "CL_rms",
+    "lift coefficient amplitude": "CL_amp",
+    "Strouhal number": "St_fD_over_U",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,12 +27,31 @@ class Reference:
     ----------
     results : dict
         Values by name, as in :meth:`alsph.Run.summary`.
+    source : str
+        Who computed them, and how.
     pressure_coefficient : (theta, mean), optional
         Degrees from the front stagnation point (m,), and C_p relative to the mean inlet pressure (m,).
     """
 
     results: dict[str, float]
+    source: str
     pressure_coefficient: tuple[FloatArray, FloatArray] | None = None
+
+
+def cylinder_in_channel(reynolds: float) -> Reference | None:
+    """Return the flow past a cylinder in the paper's channel, None at a Reynolds number that is not known."""
+    source = "finite elements of order 4 in the same channel"
+    results = _results("cylinder_summary.csv", reynolds)
+    if results is None:
+        return None
+    theta, mean, *_ = table(f"cylinder_cp_Re{reynolds:g}.csv")
+    return Reference(results, source, (theta, mean))
+
+
+def unconfined_cylinder(reynolds: float) -> Reference | None:
+    """Return the flow past a cylinder far from all sides, None at a Reynolds number that is not known."""
+    results = _results("cylinder_unconfined.csv", reynolds)
+    return Reference(results, "Qu, Norberg, Davidson, Peng and Wang (2013)") if results else None
 
 
 def rows(name: str) -> list[dict[str, str]]:
@@ -36,19 +60,12 @@ def rows(name: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def find(case: dict[str, Any]) -> Reference | None:
-    """Return the reference solution of a case with these parameters, None where there is none."""
-    if case.items() >= CHANNEL.items():
-        return _cylinder(case["reynolds"])
-    if case.get("case") == "taylor_green" and case.get("dimensions") == 2:
-        return Reference({"decay rate of the kinetic energy, U/D": 16 * np.pi**2 / case["reynolds"]})
-    return None
+def table(name: str) -> FloatArray:
+    """Return the columns (k, n) of a file of numbers with one line of header."""
+    return np.loadtxt(FOLDER / name, delimiter=",", skiprows=1, unpack=True)
 
 
-def _cylinder(reynolds: float) -> Reference | None:
-    row = next((row for row in rows("cylinder_summary.csv") if float(row["Re"]) == reynolds), None)
-    if row is None:
-        return None
-    profile = FOLDER / f"cylinder_cp_Re{row['Re']}.csv"
-    theta, mean = np.loadtxt(profile, delimiter=",", skiprows=1, usecols=(0, 1), unpack=True)
-    return Reference({name: float(row[column]) for name, column in COLUMNS.items()}, (theta, mean))
+def _results(name: str, reynolds: float) -> dict[str, float] | None:
+    """Return the values in the row of a Reynolds number, None where there is no such row."""
+    row = next((row for row in rows(name) if float(row["Re"]) == reynolds), None)
+    return {name: float(row[column]) for name, column in COLUMNS.items() if column in row} if row else None

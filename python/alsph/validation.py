@@ -1,0 +1,342 @@
+"""Validation: cases at several resolutions, judged by their measures, and the report on it."""
+
+import contextlib
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from rich.console import Console
+
+from alsph import analysis, cases, plotting
+from alsph.config import Config, RunSettings
+from alsph.errors import ConfigError, RunFolderError, SolverError
+from alsph.io import RunFolder
+from alsph.measures import Measure
+from alsph.progress import duration
+from alsph.results import Run
+from alsph.run import resume, start
+
+HEADER = "case parameters resolution quantity value reference error tolerance order result".split()
+SNAPSHOTS = 10
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A case to validate.
+
+    Attributes
+    ----------
+    case : str
+        Its name.
+    resolutions : tuple of int
+        Particles per reference length D/Δx, increasing; the finest one is judged, the others show the convergence.
+    until : float
+        End time [D/U].
+    parameters : mapping
+        Other parameters than the case's defaults.
+    """
+
+    case: str
+    resolutions: tuple[int, ...]
+    until: float
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def settings(self) -> list[str]:
+        """The parameters in words."""
+        return [f"{name} {value}" for name, value in self.parameters.items()]
+
+    @property
+    def file_name(self) -> str:
+        """Begin of the names of its run folders and figures."""
+        return "_".join([self.case, *self.settings]).replace(" ", "_")
+
+    def config(self, resolution: int, threads: int | None) -> Config:
+        """Return the case at a resolution, and the settings of its run."""
+        case = cases.find(self.case)(**self.parameters, resolution=resolution)
+        return Config(case, RunSettings(until=self.until, threads=threads, output_interval=self.until / SNAPSHOTS))
+
+
+# A new case is one line in each.
+QUICK = (
+    Entry("taylor_green", (25, 50), until=1.0),
+    Entry("taylor_green", (16, 24), until=0.2, parameters={"dimensions": 3}),
+)
+FULL = (
+    Entry("taylor_green", (25, 50, 100), until=1.0),
+    Entry("taylor_green", (16, 24, 32), until=1.0, parameters={"dimensions": 3}),
+    Entry("cylinder", (10, 20), until=60.0, parameters={"reynolds": 100}),
+    Entry("cylinder", (10, 20), until=60.0, parameters={"reynolds": 200}),
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A measure of a run, and what came of it.
+
+    Attributes
+    ----------
+    entry : Entry
+    resolution : int
+        Particles per reference length, D/Δx.
+    measure : Measure
+    order : float
+        Observed order of convergence from the next coarser resolution; NaN at the coarsest one.
+    judged : bool
+        Whether the validation depends on it.
+    """
+
+    entry: Entry
+    resolution: int
+    measure: Measure
+    order: float = np.nan
+    judged: bool = True
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The row of the report's table."""
+        measure = self.measure
+        return (
+            self.entry.case,
+            ", ".join(self.entry.settings),
+            str(self.resolution),
+            measure.name,
+            f"{measure.value:.5g}",
+            f"{measure.reference:.5g}",
+            f"{100 * measure.error:+.3g} %",
+            f"{100 * measure.tolerance:g} %",
+            "" if np.isnan(self.order) else f"{self.order:.1f}",
+            ("pass" if measure.passed else "FAIL") if self.judged else "",
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What a validation found.
+
+    Attributes
+    ----------
+    path : Path
+        The folder with the run folders, the figures and ``report.md``.
+    rows : list of Row
+    runs : list of Run
+    figures : dict
+        Names of the figures' files in `path`, and their titles.
+    """
+
+    path: Path
+    rows: list[Row]
+    runs: list[Run]
+    figures: dict[str, str]
+
+    @property
+    def passed(self) -> bool:
+        """Whether there were checks and all of them passed."""
+        judged = [row.measure.passed for row in self.rows if row.judged]
+        return bool(judged) and all(judged)
+
+    @property
+    def verdict(self) -> str:
+        """The outcome in a sentence."""
+        judged = [row.measure.passed for row in self.rows if row.judged]
+        return f"{'Passed' if self.passed else 'FAILED'}: {sum(judged)} of {len(judged)} checks."
+
+    def __str__(self) -> str:
+        """Return the table and the verdict."""
+        return f"{_table(HEADER, [row.cells for row in self.rows])}\n\n{self.verdict}"
+
+    def to_markdown(self) -> str:
+        """Return the report as Markdown; the pictures are taken from files beside it."""
+        facts = [
+            (
+                run.path.name,
+                run.status,
+                duration(run.info.get("seconds", 0)),
+                f"{run.info.get('versions', {}).get('alsph', '?')}, commit {run.info.get('commit') or '?'}",
+            )
+            for run in self.runs
+        ]
+        return "\n\n".join(
+            [
+                "# Validation",
+                self.verdict,
+                "The finest resolution of a case is judged; the order is the one observed from the next coarser one. "
+                "Errors are relative, those of a zero reference absolute.",
+                _table([*HEADER, "source"], [(*row.cells, row.measure.source) for row in self.rows]),
+                *(f"![{title}]({file})" for file, title in self.figures.items()),
+                _table(["run", "status", "time", "alsph"], facts) + "\n",
+            ]
+        )
+
+    def _repr_html_(self) -> str:
+        lines = [("th", HEADER), *(("td", row.cells) for row in self.rows)]
+        rows = ("".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) for tag, cells in lines)
+        return f"<p>{self.verdict}</p><table>" + "".join(f"<tr>{row}</tr>" for row in rows) + "</table>"
+
+
+def validate(
+    *names: str,
+    full: bool = False,
+    resolutions: Sequence[int] = (),
+    threads: int | None = None,
+    output: str | Path = "runs/validation",
+    progress: bool = True,
+    suite: Sequence[Entry] | None = None,
+) -> Report:
+    """Run cases at several resolutions and compare them with their references.
+
+    Runs are kept in the output folder: those that have finished are not run again, and those that were cut go on.
+
+    Parameters
+    ----------
+    *names
+        Cases to validate; all of the suite if none is given.
+    full
+        Take the full suite (hours) in place of the quick one (minutes).
+    resolutions
+        Other resolutions D/Δx than those of the suite.
+    threads
+        Number of threads; all cores if None.
+    output
+        Folder for the runs, the figures and ``report.md``.
+    progress
+        Report progress.
+    suite
+        Other entries than those of the quick and the full suite.
+
+    Raises
+    ------
+    ConfigError, RunFolderError
+        If a case or the folder cannot be used.
+    """
+    entries = _chosen(names, full, suite)
+    if resolutions:
+        entries = [replace(entry, resolutions=tuple(sorted(set(resolutions)))) for entry in entries]
+    jobs = [(entry, [entry.config(n, threads) for n in entry.resolutions]) for entry in entries]
+    report = Report(Path(output), [], [], {})
+    heading = _Heading([config for _, configs in jobs for config in configs], enabled=progress)
+    for entry, configs in jobs:
+        runs = []
+        for config in configs:
+            heading.print(config)
+            folder = report.path / f"{entry.file_name}_resolution_{config.case.resolution}"
+            try:
+                runs.append(_run(config, folder, progress))
+            except SolverError as error:
+                report.rows.append(Row(entry, config.case.resolution, _broken_down(Run(folder), config, error)))
+            report.runs.append(Run(folder))
+            heading.seconds.append(report.runs[-1].info["seconds"])
+        rows = _judge(entry, runs)
+        report.rows.extend(rows)
+        report.figures.update(_draw(entry, runs, rows, report.path))
+        (report.path / "report.md").write_text(report.to_markdown(), encoding="utf-8")
+    return report
+
+
+def _chosen(names: Sequence[str], full: bool, suite: Sequence[Entry] | None) -> Sequence[Entry]:
+    """Return the entries of the suite for the cases with these names, all of them if there are no names."""
+    suite = suite or (FULL if full else QUICK)
+    for name in names:
+        if cases.find(name).name not in [entry.case for entry in suite]:
+            elsewhere = "; use --full (full=True)" if not full and name in [entry.case for entry in FULL] else ""
+            raise ConfigError(f"{name}: not in this suite{elsewhere}")
+    return [entry for entry in suite if not names or entry.case in names]
+
+
+def _run(config: Config, path: Path, progress: bool) -> Run:
+    """Return the finished run of that case in a folder: as it is there, resumed, or run from the start."""
+    if (path / "case.toml").exists():
+        folder = RunFolder(path)
+        kept = folder.config()
+        if (kept.case, kept.until) == (config.case, config.until):
+            if not (path / "run.json").exists():  # cut before its first step
+                folder.write_info({})
+            if (run := Run(path)).status == "finished":
+                return run
+            with contextlib.suppress(RunFolderError):  # cut before its first checkpoint
+                return resume(path, threads=config.run.threads, progress=progress)
+    return start(config, path, force=True, progress=progress)
+
+
+class _Heading:
+    """Announces each run, with the time that it and those after it will take by the pace of those before.
+
+    Attributes
+    ----------
+    seconds : list of float
+        What each run so far took.
+    """
+
+    def __init__(self, configs: list[Config], *, enabled: bool) -> None:
+        self.seconds: list[float] = []
+        self._console = Console(highlight=False, quiet=not enabled)
+        self._work = [_work(config) for config in configs]
+
+    def print(self, config: Config) -> None:
+        done, count = sum(self._work[: len(self.seconds)]), len(self._work)
+        left = f"; ETA of all {duration(sum(self.seconds) / done * (sum(self._work) - done))}" if done else ""
+        line = f"run {len(self.seconds) + 1} of {count}: {config.case.name}, resolution {config.case.resolution}{left}"
+        self._console.print(line, markup=False, soft_wrap=True)
+
+
+def _work(config: Config) -> float:
+    """Pairs of particles times steps, up to a factor: what the time that a run takes is proportional to."""
+    case = config.case
+    neighbours = case.support_layers**case.space_dimensions
+    return float(case.particle_estimate() * neighbours * config.until * case.resolution)
+
+
+def _broken_down(run: Run, config: Config, error: SolverError) -> Measure:
+    """Return a measure that fails, with the reason for its source."""
+    time = run.history["time"]
+    reached = time[-1] / config.until if len(time) else 0.0
+    return Measure("share of the run computed before it broke down", reached, 1.0, 0.0, str(error))
+
+
+def _judge(entry: Entry, runs: list[Run]) -> list[Row]:
+    """Return the measures of the runs of an entry, from the coarsest to the finest, that have a reference."""
+    rows: list[Row] = []
+    coarser: dict[str, tuple[int, float]] = {}
+    for run in runs:
+        resolution = run.case["resolution"]
+        for measure in run.measures:
+            if np.isnan(measure.reference):
+                continue
+            earlier, error = coarser.get(measure.name, (resolution, np.nan))
+            order = analysis.observed_order((earlier, resolution), (error, measure.error))
+            rows.append(Row(entry, resolution, measure, order, resolution == entry.resolutions[-1]))
+            coarser[measure.name] = resolution, measure.error
+    if runs and not rows:
+        rows.append(Row(entry, entry.resolutions[-1], Measure("no quantity has a reference value", np.nan)))
+    return rows
+
+
+def _draw(entry: Entry, runs: list[Run], rows: list[Row], path: Path) -> dict[str, str]:
+    """Draw each profile at all resolutions, and the errors over the resolution; return file names and titles."""
+    figures: dict[str, Figure] = {}
+    profiles = {f"D/Δx = {run.case['resolution']}": run.profiles for run in runs}
+    for same in zip(*profiles.values(), strict=False):
+        figures[same[0].file_name] = plotting.profile(dict(zip(profiles, same, strict=True)))
+    errors: dict[str, dict[int, float]] = {}
+    for row in rows:
+        if abs(row.measure.error) > 0:
+            errors.setdefault(row.measure.name, {})[row.resolution] = row.measure.error
+    if len(runs) > 1 and errors:
+        figures["convergence"] = plotting.convergence(errors)
+    titles = {}
+    for name, figure in figures.items():
+        figure.savefig(path / f"{entry.file_name}_{name}.png")
+        titles[f"{entry.file_name}_{name}.png"] = ", ".join([entry.case, *entry.settings, name.replace("_", " ")])
+    return titles
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table whose columns are aligned in plain text too."""
+    lines = [[cell.replace("|", r"\|") for cell in cells] for cells in (header, *rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    lines.insert(1, ["-" * width for width in widths])
+    return "\n".join("| " + " | ".join(map(str.ljust, cells, widths)) + " |" for cells in lines)
