@@ -57,6 +57,8 @@ pub enum WallPressure {
     Paper,
     /// Shepard average of the fluid's with the hydrostatic term (Adami, Hu and Adams 2012).
     Adami,
+    /// Shepard average of the fluid's, each continued to the solid particle along its own gradient: exact for linear fields.
+    Linear,
 }
 
 /// What closes one side of the domain.

@@ -93,6 +93,18 @@ impl<const D: usize> Stencil<D> {
         self.neighbours.for_each(a, b, Apply { operator, position, correction, f });
     }
 
+    /// `out[i] = value of the operator at i` for the particles with solid neighbours (and others of their clusters), in parallel.
+    pub fn evaluate_near_solids<O: Operator<D>>(&self, operator: O, out: &mut [O::Value])
+    where
+        O::Value: Send,
+    {
+        assert!(self.corrected, "the corrections are of another frame");
+        let Self { position, correction, .. } = self;
+        let f = |_, value, out: &mut O::Value, (): &mut ()| *out = value;
+        let count = out.len();
+        self.neighbours.for_each(out, &mut nothing(count), NearSolids(Apply { operator, position, correction, f }));
+    }
+
     /// `f(i, value of the operator at i, &mut out[i])` for every real particle, in parallel.
     pub fn for_each_one<O: Operator<D>, A: Send>(
         &self,
@@ -179,6 +191,18 @@ where
     fn visit<V: Lanes>(&self, cluster: Cluster, row: Row<'_>, a: &mut [A], b: &mut [B]) {
         let mut near = Corrected { cluster, row, position: self.position, correction: self.correction };
         hand_out(cluster, self.operator.apply::<V>(&mut near), a, b, &self.f);
+    }
+}
+
+/// A visit to the clusters with solid neighbours only.
+struct NearSolids<T>(T);
+
+impl<A, B, T: Visit<A, B>> Visit<A, B> for NearSolids<T> {
+    #[inline(always)]
+    fn visit<V: Lanes>(&self, cluster: Cluster, row: Row<'_>, a: &mut [A], b: &mut [B]) {
+        if !row.solid().is_empty() {
+            self.0.visit::<V>(cluster, row, a, b);
+        }
     }
 }
 

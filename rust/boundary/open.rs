@@ -63,6 +63,12 @@ fn sides(settings: &Settings) -> Vec<Side> {
         .collect()
 }
 
+/// How far a position lies in the inlet buffer, beyond the inlet's plane; negative inside the domain, −∞ without an inlet.
+pub fn inlet_depth<const D: usize>(settings: &Settings) -> impl Fn(&Vector<D>) -> f64 + Sync {
+    let inlets: Vec<Side> = sides(settings).into_iter().filter(|side| side.kind == Boundary::Inlet).collect();
+    move |position| outermost(&inlets, position).map_or(f64::NEG_INFINITY, |(inside, _)| -inside)
+}
+
 /// The side that `position` is farthest beyond, or nearest to, and its distance inside it.
 fn outermost<const D: usize>(sides: &[Side], position: &Vector<D>) -> Option<(f64, Side)> {
     sides.iter().map(|&side| (side.inside(position), side)).min_by(|a, b| a.0.total_cmp(&b.0))

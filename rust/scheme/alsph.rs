@@ -1,6 +1,6 @@
 //! The ALSPH step: equations (8) to (13) of the paper.
 
-use crate::boundary::{Walls, shepard};
+use crate::boundary::{Walls, inlet_depth, shepard};
 use crate::frame::Frame;
 use crate::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, vector_laplacian};
 use crate::parallel;
@@ -33,6 +33,8 @@ pub struct Alsph<const D: usize> {
     /// u*.
     velocity_star: Vec<Vector<D>>,
     pressure_laplacian: Vec<f64>,
+    /// ∇p^m near solids, where the pressure is continued into them.
+    pressure_gradient: Vec<Vector<D>>,
 }
 
 /// What stays the same during one step.
@@ -89,6 +91,7 @@ impl<const D: usize> Alsph<D> {
         self.velocity_laplacian.resize(real, Vector::zeros());
         self.velocity_star.resize(count, Vector::zeros());
         self.pressure_laplacian.resize(real, 0.0);
+        self.pressure_gradient.resize(count, Vector::zeros());
     }
 
     /// ∇·u^m and ∇²u^m, and p^m beside ∇·u^m: the first pass over a frame, so it forms the corrections too.
@@ -145,13 +148,22 @@ impl<const D: usize> Alsph<D> {
 
     /// p^{m+1} (10), with the pressure of solid particles (20).
     fn update_pressure(&mut self, step: Step, particles: &mut Particles<D>, frame: &Frame<D>) {
-        let Particles { real, kind, normal, pressure, .. } = particles;
+        if step.settings.wall_pressure == WallPressure::Linear {
+            let gradient = &mut self.pressure_gradient;
+            frame.stencil.evaluate_near_solids(Gradient(&particles.pressure), &mut gradient[..particles.real]);
+            frame.images.vectors(gradient);
+        }
+        let Particles { real, kind, normal, position, pressure, .. } = particles;
         let (kind, normal) = (&*kind, &*normal);
         let Step { settings, time_step: dt, penalty } = step;
         let paper_walls = settings.wall_pressure == WallPressure::Paper;
         let (star, initial, laplacian) = (&self.velocity_star, &self.velocity_initial, &self.pressure_laplacian);
+        let (position, inlet_depth) = (&*position, inlet_depth(settings));
+        let deep = |i: usize| kind[i] == ParticleKind::Inlet && inlet_depth(&position[i]) > settings.support_radius();
         frame.stencil.for_each_one(Divergence(star), &mut pressure[..*real], |i, divergence, p| {
             let solid = kind[i] == ParticleKind::Solid;
+            // Deep in the inlet the velocity is all prescribed, and cut off at the end of the buffer.
+            let divergence = if deep(i) { 0.0 } else { divergence };
             if kind[i] == ParticleKind::Outlet {
                 *p = 0.0;
             } else if !solid || paper_walls {
@@ -164,9 +176,25 @@ impl<const D: usize> Alsph<D> {
         });
         frame.images.scalars(&mut particles.pressure);
         if !paper_walls {
-            extrapolate_wall_pressure(settings, particles, frame);
+            self.extrapolate_wall_pressure(settings, particles, frame);
             frame.images.scalars(&mut particles.pressure);
         }
+    }
+
+    /// The pressure of solid particles: the Shepard average of the fluid's, with the hydrostatic term (Adami, Hu and Adams 2012,
+    /// eq. 27; bodies do not accelerate) or continued along its gradient.
+    fn extrapolate_wall_pressure(&self, settings: &Settings, particles: &mut Particles<D>, frame: &Frame<D>) {
+        let gravity = Vector::<D>::from_column_slice(&settings.body_force);
+        let Particles { real, kind, pressure, .. } = &*particles;
+        let gradient = |j: usize| match settings.wall_pressure {
+            WallPressure::Linear => self.pressure_gradient[j],
+            _ => gravity * settings.density,
+        };
+        let at = |j: usize, r_ij: Vector<D>| [pressure[j] + gradient(j).dot(&r_ij)];
+        let solids = (0..*real).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
+        let average = |i| (i, shepard(settings, &frame.stencil, i, at).map_or(0.0, |[average]| average));
+        let extrapolated: Vec<(usize, f64)> = solids.map(average).collect();
+        extrapolated.into_iter().for_each(|(i, p)| particles.pressure[i] = p);
     }
 
     /// u^{m+1} (11). Buffers and solids keep their velocities.
@@ -229,18 +257,6 @@ fn extrapolate_wall_velocity<const D: usize>(
         }
     });
     frame.images.vectors(&mut walls.viscous_velocity);
-}
-
-/// The pressure of solid particles: the Shepard average of the fluid's with the hydrostatic term (Adami, Hu and Adams
-/// 2012, eq. 27; bodies do not accelerate).
-fn extrapolate_wall_pressure<const D: usize>(settings: &Settings, particles: &mut Particles<D>, frame: &Frame<D>) {
-    let gravity = Vector::<D>::from_column_slice(&settings.body_force);
-    let Particles { real, kind, pressure, .. } = &*particles;
-    let at = |j: usize, r_ij: Vector<D>| [pressure[j] + settings.density * gravity.dot(&r_ij)];
-    let solids = (0..*real).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
-    let average = |i| (i, shepard(settings, &frame.stencil, i, at).map_or(0.0, |[average]| average));
-    let extrapolated: Vec<(usize, f64)> = solids.map(average).collect();
-    extrapolated.into_iter().for_each(|(i, p)| particles.pressure[i] = p);
 }
 
 fn copy<T: Copy>(from: &[T], to: &mut Vec<T>) {
