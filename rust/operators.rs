@@ -113,18 +113,23 @@ impl<const D: usize> Operator<D> for GradientAndLaplacian<'_> {
     #[inline(always)]
     fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [(Vector<D>, f64); LANES] {
         let here: [V; 2] = [near.cluster().lanes(|i| self.0[i][0]), near.cluster().lanes(|i| self.0[i][1])];
-        let (mut gradient, mut laplacian) = ([V::zero(); D], V::zero());
+        let (mut gradient, mut laplacian, mut linear) = ([V::zero(); D], V::zero(), [V::zero(); D]);
         near.for_each(
             #[inline(always)]
             |j, slope: V, r_ij| {
                 let [f, g] = self.0[j];
                 add_product(&mut gradient, (V::splat(f) - here[0]) * slope, r_ij);
-                laplacian = laplacian.plus_product(V::splat(g) - here[1], slope);
+                let difference = (V::splat(g) - here[1]) * slope;
+                laplacian += difference;
+                add_product(&mut linear, difference, r_ij);
             },
         );
         let corrections = near.corrections();
-        let (gradient, laplacian) = (corrected(gradient, &corrections), laplacian.store());
-        std::array::from_fn(|lane| (gradient[lane], corrections[lane].laplacian * laplacian[lane]))
+        let (gradient, laplacian, linear) = (corrected(gradient, &corrections), laplacian.store(), vectors(linear));
+        std::array::from_fn(|lane| {
+            let Correction { inverse, laplacian: factor, asymmetry } = &corrections[lane];
+            (gradient[lane], factor * (laplacian[lane] + (inverse * asymmetry).dot(&linear[lane])))
+        })
     }
 }
 
@@ -137,6 +142,8 @@ impl<const D: usize, F: Fn(usize, usize) -> Vector<D> + Sync> Operator<D> for La
         let cluster = near.cluster();
         let here: [V; D] = cluster.vectors(velocity);
         let (mut laplacian, mut tensor) = ([V::zero(); D], [[V::zero(); D]; D]);
+        // What the solids add to ∇u, before its correction, where they show another velocity than their own.
+        let mut shown = [[V::zero(); D]; D];
         near.for_each_flowing(
             #[inline(always)]
             |j, slope: V, r_ij| {
@@ -152,14 +159,20 @@ impl<const D: usize, F: Fn(usize, usize) -> Vector<D> + Sync> Operator<D> for La
             |s, slope: V, r_ij| {
                 let seen = cluster.particles().map(|i| (self.seen)(s, i));
                 for k in 0..D {
-                    laplacian[k] = laplacian[k].plus_product(V::load(&seen.map(|u| u[k])) - here[k], slope);
-                    add_product(&mut tensor[k], (V::splat(velocity[s][k]) - here[k]) * slope, r_ij);
+                    let (seen, own) = (V::load(&seen.map(|u| u[k])), V::splat(velocity[s][k]));
+                    laplacian[k] = laplacian[k].plus_product(seen - here[k], slope);
+                    add_product(&mut tensor[k], (own - here[k]) * slope, r_ij);
+                    add_product(&mut shown[k], (seen - own) * slope, r_ij);
                 }
             },
         );
         let corrections = near.corrections();
-        let (laplacian, divergence) = (vectors(laplacian), corrected_trace(tensor, &corrections));
-        std::array::from_fn(|lane| (laplacian[lane] * corrections[lane].laplacian, divergence[lane]))
+        let (laplacian, tensor, shown) = (vectors(laplacian), matrices(tensor), matrices(shown));
+        std::array::from_fn(|lane| {
+            let Correction { inverse, laplacian: factor, asymmetry } = &corrections[lane];
+            let linear = (tensor[lane] + shown[lane]) * (inverse * asymmetry);
+            ((laplacian[lane] + linear) * *factor, tensor[lane].component_mul(inverse).sum())
+        })
     }
 }
 

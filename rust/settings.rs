@@ -125,6 +125,8 @@ pub struct Settings {
     /// C_BV.
     pub penalty_constant: f64,
     pub velocity_laplacian: VelocityLaplacian,
+    /// Correct the scalar Laplacians so that they vanish for linear fields on any particle arrangement.
+    pub laplacian_correction: bool,
     pub shifting: Shifting,
     /// β of the maximum-velocity shift.
     pub shift_coefficient: f64,

@@ -1,7 +1,7 @@
 //! The stencil: all that the derivatives need to know of the particle positions of one frame. (14) (17)
 
 use crate::kernel::{Kernel, Smoothing};
-use crate::lanes::{LANES, Lanes, from, matrices, norm_squared};
+use crate::lanes::{LANES, Lanes, from, matrices, norm_squared, vectors};
 use crate::neighbours::{Cluster, Entry, NeighbourList, Row, RowMut, Visit, VisitMut};
 use crate::operators::{Neighbours, Nothing, Operator};
 use crate::parallel;
@@ -26,6 +26,8 @@ pub struct Stencil<const D: usize> {
     corrected: bool,
     /// The volume in the slopes before they are corrected.
     nominal: f64,
+    /// Whether the Laplacians are corrected for the asymmetry of the neighbours.
+    balanced: bool,
 }
 
 /// What the sums over a particle's neighbours are corrected with.
@@ -35,6 +37,8 @@ pub struct Correction<const D: usize> {
     pub inverse: Matrix<D>,
     /// −2(D+2) / (2 + tr α).
     pub laplacian: f64,
+    /// Σ slope r_ij: what a uniform gradient adds to the Laplacian where neighbours are not evenly spread; zero if that is to stay.
+    pub asymmetry: Vector<D>,
 }
 
 impl<const D: usize> Stencil<D> {
@@ -44,7 +48,7 @@ impl<const D: usize> Stencil<D> {
         self.position.resize(particles.len(), Vector::zeros());
         parallel::for_each(&mut self.position, |i, position| *position = particles.position[i]);
         self.volume.resize(particles.len(), 0.0);
-        self.correction.resize(particles.real, Correction::of(&Matrix::identity()));
+        self.correction.resize(particles.real, Correction::of(&Matrix::identity(), Vector::zeros()));
         let (position, real) = (&self.position, particles.real);
         // The slopes first hold the nominal volume Δx^D in the place of V_j, lest f32 overflow in small units.
         let nominal = settings.particle_spacing.powi(D as i32);
@@ -55,6 +59,7 @@ impl<const D: usize> Stencil<D> {
         });
         mirror(&mut self.volume);
         self.nominal = nominal;
+        self.balanced = settings.laplacian_correction;
         self.corrected = false;
     }
 
@@ -75,8 +80,9 @@ impl<const D: usize> Stencil<D> {
         if self.corrected {
             return self.for_each(operator, a, b, f);
         }
-        let Self { neighbours, position, volume, correction, nominal, .. } = self;
-        neighbours.for_each_mut((correction, a, b), CorrectAndApply { operator, position, volume, nominal: *nominal, f });
+        let Self { neighbours, position, volume, correction, .. } = self;
+        let (nominal, balanced) = (self.nominal, self.balanced);
+        neighbours.for_each_mut((correction, a, b), CorrectAndApply { operator, position, volume, nominal, balanced, f });
         self.corrected = true;
     }
 
@@ -260,8 +266,11 @@ struct Correcting<'a, V, const D: usize> {
     position: &'a [Vector<D>],
     volume: &'a [f64],
     nominal: f64,
+    balanced: bool,
     /// −α of the neighbours so far, its lower triangle.
     alpha: [[V; D]; D],
+    /// Σ slope r_ij of the neighbours so far.
+    asymmetry: [V; D],
     correction: &'a mut [Correction<D>],
 }
 
@@ -271,20 +280,21 @@ impl<V: Lanes, const D: usize> Correcting<'_, V, D> {
     fn each(&mut self, range: Range<usize>, mut add: impl FnMut(usize, V, [V; D])) {
         let here: [V; D] = self.cluster.vectors(self.position);
         let inverse = 1.0 / self.nominal;
-        let mut alpha = self.alpha;
+        let (mut alpha, mut asymmetry) = (self.alpha, self.asymmetry);
         for entry in &mut self.row.entries[range] {
             let j = entry.j();
             entry.set_slopes(entry.slopes::<V>() * V::splat(self.volume[j] * inverse));
             let (slope, r_ij) = (entry.slopes::<V>(), from(here, &self.position[j]));
             for k in 0..D {
                 let weight = slope * r_ij[k];
+                asymmetry[k] += weight;
                 for l in 0..=k {
                     alpha[k][l] = alpha[k][l].plus_product(weight, r_ij[l]);
                 }
             }
             add(j, slope, r_ij);
         }
-        self.alpha = alpha;
+        (self.alpha, self.asymmetry) = (alpha, asymmetry);
     }
 }
 
@@ -317,9 +327,10 @@ impl<V: Lanes, const D: usize> Neighbours<V, D> for Correcting<'_, V, D> {
             }
         }
         let alpha = matrices(self.alpha);
+        let asymmetry = if self.balanced { vectors(self.asymmetry) } else { [Vector::zeros(); LANES] };
         let corrections = std::array::from_fn(
             #[inline(always)]
-            |lane| Correction::of(&-alpha[lane]),
+            |lane| Correction::of(&-alpha[lane], asymmetry[lane]),
         );
         self.correction.copy_from_slice(&corrections[..self.correction.len()]);
         corrections
@@ -332,6 +343,7 @@ struct CorrectAndApply<'a, O, F, const D: usize> {
     position: &'a [Vector<D>],
     volume: &'a [f64],
     nominal: f64,
+    balanced: bool,
     f: F,
 }
 
@@ -347,20 +359,20 @@ where
         row: RowMut<'_>,
         (correction, a, b): (&mut [Correction<D>], &mut [A], &mut [B]),
     ) {
-        let Self { position, volume, nominal, .. } = *self;
-        let alpha = [[V::zero(); D]; D];
-        let mut near = Correcting { cluster, row, position, volume, nominal, alpha, correction };
+        let Self { position, volume, nominal, balanced, .. } = *self;
+        let (alpha, asymmetry) = ([[V::zero(); D]; D], [V::zero(); D]);
+        let mut near = Correcting { cluster, row, position, volume, nominal, balanced, alpha, asymmetry, correction };
         hand_out(cluster, self.operator.apply::<V>(&mut near), a, b, &self.f);
     }
 }
 
 impl<const D: usize> Correction<D> {
     #[inline(always)]
-    fn of(alpha: &Matrix<D>) -> Self {
+    fn of(alpha: &Matrix<D>, asymmetry: Vector<D>) -> Self {
         let inverse = match alpha.try_inverse() {
             Some(inverse) if inverse.norm_squared() < SINGULAR * SINGULAR => inverse,
             _ => Matrix::identity(),
         };
-        Self { inverse, laplacian: -2.0 * (D as f64 + 2.0) / (2.0 + alpha.trace()) }
+        Self { inverse, laplacian: -2.0 * (D as f64 + 2.0) / (2.0 + alpha.trace()), asymmetry }
     }
 }

@@ -124,6 +124,27 @@ fn plug_flow_between_slip_walls_stays_uniform() {
     }
 }
 
+#[test]
+fn a_sheared_inflow_passes_without_pressure() {
+    // u = 1 + 0.4 cos 2πy between slip walls is a steady flow without viscosity, and its pressure is uniform.
+    let (mut value, mut particles) = channel(24, false);
+    value["kinematic_viscosity"] = 0.0.into();
+    let exact = |y: f64| 1.0 + 0.4 * (2.0 * PI * y).cos();
+    for i in 0..particles.real {
+        particles.velocity[i][0] = exact(particles.position[i][1]);
+    }
+    let mut simulation = Simulation::new(common::parse(&value), particles, Clock::default(), Some(2)).expect("valid");
+    simulation.advance_until(2.0, None).expect("stable");
+    let particles = simulation.particles();
+    for i in (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Fluid) {
+        let error = (particles.velocity[i] - Vector::from([exact(particles.position[i][1]), 0.0])).norm();
+        assert!(error < 0.06, "velocity off by {error} at {:?}", particles.position[i]);
+    }
+    for i in (0..particles.real).filter(|&i| particles.kind[i] != ParticleKind::Outlet) {
+        assert!(particles.pressure[i].abs() < 0.1, "p = {} at {:?}", particles.pressure[i], particles.position[i]);
+    }
+}
+
 fn bits(particles: &Particles<2>) -> Vec<u64> {
     let vectors = particles.position.iter().chain(&particles.velocity).flat_map(|v| v.iter().copied());
     vectors.chain(particles.pressure.iter().copied()).map(f64::to_bits).chain(particles.id.iter().copied()).collect()

@@ -207,7 +207,7 @@ def _plot(
         profile.file_name: plotting.profile({"computed": profile}).savefig for profile in run.profiles
     }
     drawings["ledger"] = run.plot_ledger
-    if run.bodies:
+    if run.body:
         drawings["forces"] = run.plot_forces
     if run.config.case.surface_points():
         drawings["pressure_coefficient"] = run.plot_pressure_coefficient

@@ -143,6 +143,11 @@ class Run:
         suffix = "_pressure_force_x"
         return [name.removesuffix(suffix) for name in self.history if name.endswith(suffix)]
 
+    @property
+    def body(self) -> str | None:
+        """Name of the body in the flow that drag and lift are those of; None between walls."""
+        return self.config.case.coefficient_body
+
     def coefficient(self, axis: str, part: str = "total", body: str | None = None) -> FloatArray:
         """Force coefficient in every step, F / (½ρU²D).
 
@@ -168,7 +173,10 @@ class Run:
     @cached_property
     def window(self) -> Window:
         """Averaging window, found from the lift and the drag (see :func:`alsph.analysis.averaging_window`)."""
-        return analysis.averaging_window(self.history["time"], self.coefficient("x"), self.coefficient("y"))
+        time = self.history["time"]
+        missing = np.full(len(time), np.nan)
+        drag, lift = (self.coefficient(axis) for axis in "xy") if self.body else (missing, missing)
+        return analysis.averaging_window(time, drag, lift)
 
     @cached_property
     def drag(self) -> Load:
@@ -261,7 +269,7 @@ class Run:
 
     def _box_balance(self, snapshot: Snapshot, box: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
         fluid = snapshot.fluid
-        viscosity = 1.0 / float(self.case["reynolds"])
+        viscosity = self.config.case.kinematic_viscosity
         fields = snapshot.position[fluid], snapshot.velocity[fluid], snapshot.pressure[fluid]
         return sampling.control_volume(*fields, box, self.spacing, 1.0, viscosity)
 
@@ -285,7 +293,7 @@ class Run:
             "averaged to tU/D": Estimate(self.window.end),
             "averaging rule": self.window.rule,
         }
-        if self.bodies:
+        if self.body:
             results["shedding periods"] = self.window.periods
         results["mean velocity divergence, |∇·u| D/U"] = self.divergence.mean
         for measure in self.measures:

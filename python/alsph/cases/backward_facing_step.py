@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from alsph import reference, sampling
-from alsph.cases.base import WalledCase
+from alsph.cases.base import Case
 from alsph.geometry import FloatArray, Kind, cell_centres, cells, inside, join, lattice, particles, walls
 from alsph.measures import Measure
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from alsph.results import Run
 
 
-class BackwardFacingStep(WalledCase):
+class BackwardFacingStep(Case):
     """Flow over a backward-facing step of height D in a channel with no-slip walls; U is the mean inflow velocity.
 
     The step's edge lies at x = 0, y = D; the channel behind it reaches from y = 0 to y = ED/(E - 1) with the expansion

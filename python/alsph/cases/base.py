@@ -64,17 +64,21 @@ class Case(Parameters):
     velocity_laplacian: Literal["scalar", "vector"] = Field(
         default="scalar", description="viscous term per component, or eq. (16) as printed"
     )
+    laplacian_correction: bool = Field(
+        default=True, description="make the scalar Laplacians vanish for linear fields on any particle arrangement"
+    )
     shifting: Literal["xsph", "maximum_velocity", "none"] = Field(
         default="xsph", description="particle shifting: eq. (18), with β u_max in place of the XSPH velocity, or none"
     )
     shift_coefficient: float = Field(default=0.04, ge=0, le=1, description="β of the maximum_velocity shifting [-]")
     shift_limit: float = Field(default=0.1, gt=0, le=0.5, description="largest shift in a step [Δx]")
     wall_velocity: Literal["paper", "adami", "morris"] = Field(
-        default="morris",
+        default="adami",
         description="velocity of solid particles in the viscous term: the body's own, or extrapolated for no-slip",
     )
-    wall_pressure: Literal["paper", "adami"] = Field(
-        default="adami", description="pressure of solid particles: eqs. (10) and (20), or Shepard extrapolation"
+    wall_pressure: Literal["paper", "adami", "linear"] = Field(
+        default="linear",
+        description="pressure of solid particles: eqs. (10) and (20), or that of the fluid around, constant or linear",
     )
 
     @classmethod
@@ -154,7 +158,7 @@ class Case(Parameters):
         """Return the engine's settings (see docs/architecture.md)."""
         shared = (
             "smoothing_ratio kernel adaptive_time_step time_step_safety max_iterations penalty_constant "
-            "velocity_laplacian shifting shift_coefficient shift_limit wall_velocity wall_pressure"
+            "velocity_laplacian laplacian_correction shifting shift_coefficient shift_limit wall_velocity wall_pressure"
         )
         return {name: getattr(self, name) for name in shared.split()} | {
             "dimensions": self.space_dimensions,
@@ -292,18 +296,6 @@ class Case(Parameters):
                 f"use {below:.6g} or {above:.6g}"
             )
         return round(cells)
-
-
-class WalledCase(Case):
-    """A case between straight no-slip walls.
-
-    There the extrapolated wall velocity is second order in Δx; the limited ratio in the rule of Morris, Fox and Zhu
-    lets the fluid slip, which leaves first order.
-    """
-
-    wall_velocity: Literal["paper", "adami", "morris"] = Field(
-        default="adami", description=Case.model_fields["wall_velocity"].description
-    )
 
 
 def _free_memory() -> float:

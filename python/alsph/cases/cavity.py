@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from alsph import reference, sampling
-from alsph.cases.base import WalledCase
+from alsph.cases.base import Case
 from alsph.geometry import FloatArray, Kind, cells, join, particles, walls
 from alsph.measures import Measure, Profile
 
@@ -22,7 +22,7 @@ LINE = np.linspace(0, 1, 401)[1:-1]
 SOURCE = "independent high-order solution (alsph/reference)"
 
 
-class Cavity(WalledCase):
+class Cavity(Case):
     """Flow in a square cavity of side D, driven by its lid at y = D, which slides along x with the velocity U.
 
     The fluid starts from rest and comes to a steady state. Compared are the velocities on the centre lines with

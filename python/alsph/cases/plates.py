@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from alsph.analysis import error_norms
-from alsph.cases.base import WalledCase
+from alsph.cases.base import Case
 from alsph.geometry import FloatArray, Kind, cells, join, particles, walls
 from alsph.measures import Measure, Profile
 
@@ -22,7 +22,7 @@ TERMS = np.arange(1, 401)[:, None]
 """Indices of the terms of the series (400, 1); those that are left out have decayed after t* = 1e-4 Re."""
 
 
-class Plates(WalledCase):
+class Plates(Case):
     """Flow along x between no-slip plates at y = 0 and y = D, periodic along x; it starts from rest."""
 
     upper_velocity: ClassVar[float]
