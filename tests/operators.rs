@@ -1,6 +1,5 @@
 //! The operators on disordered particles: exact for linear fields, consistent for quadratic ones, in 2-D and 3-D.
 
-use alsph::frame::{Frame, Travel};
 use alsph::kernel::{Kernel, QuinticSpline, Smoothing, WendlandC2, WendlandC4};
 use alsph::lanes::{LANES, Portable};
 use alsph::neighbours::{Cluster, brute_force_neighbours};
@@ -10,16 +9,13 @@ use alsph::operators::{
 use alsph::settings::Settings;
 use alsph::shifting::shift;
 use alsph::stencil::Corrected;
-use alsph::{ParticleKind, Particles, Vector};
+use alsph::{ParticleKind, Vector};
 use approx::assert_relative_eq;
+use common::manufactured::{Errors, OperatorErrors, laplacian_of_positions};
+use common::set::Set;
 use proptest::prelude::*;
 
 mod common;
-
-struct Set<const D: usize> {
-    particles: Particles<D>,
-    frame: Frame<D>,
-}
 
 impl<const D: usize> Set<D> {
     /// A box of disordered particles without walls, every third one solid: those at its sides have one-sided neighbourhoods.
@@ -27,27 +23,6 @@ impl<const D: usize> Set<D> {
         let mut particles = common::particles(common::lattice::<D>(side, disorder));
         particles.kind.iter_mut().step_by(3).for_each(|kind| *kind = ParticleKind::Solid);
         Self::of(particles, settings, true)
-    }
-
-    fn of(mut particles: Particles<D>, settings: &Settings, reorder: bool) -> Self {
-        let mut frame = Frame::default();
-        frame.search(settings, &mut particles, Travel::default(), reorder);
-        frame.stencil.correct();
-        Self { particles, frame }
-    }
-
-    /// The operator's value at every real particle.
-    fn apply<O: Operator<D>>(&self, operator: O) -> Vec<O::Value>
-    where
-        O::Value: Clone + Send,
-    {
-        let mut values = vec![None; self.particles.real];
-        self.frame.stencil.for_each_one(operator, &mut values, |_, value, out| *out = Some(value));
-        values.into_iter().flatten().collect()
-    }
-
-    fn field<T>(&self, f: impl Fn(&Vector<D>) -> T) -> Vec<T> {
-        self.particles.position.iter().map(f).collect()
     }
 
     /// Particles all of whose neighbours have their support inside the box.
@@ -307,4 +282,58 @@ fn largest_laplacian_eigenvalue_is_that_of_the_stability_law() {
         let eigenvalue = common::parse(&value).largest_laplacian_eigenvalue();
         assert_relative_eq!(eigenvalue, expected, epsilon = 0.01);
     }
+}
+
+/// Errors on a periodic lattice displaced by up to `disorder` spacings.
+fn errors_in_a_box<const D: usize>(side: usize, disorder: f64) -> OperatorErrors {
+    let settings = common::settings::<D>(1.0 / side as f64, "periodic");
+    let set = Set::<D>::of(common::particles(common::lattice(side, disorder)), &settings, true);
+    OperatorErrors::of(&set, &(0..set.particles.real).collect::<Vec<_>>())
+}
+
+/// The observed order when Δx is halved.
+fn order(coarse: Errors, fine: Errors) -> f64 {
+    (coarse.mean / fine.mean).log2()
+}
+
+fn second_order_on_a_lattice<const D: usize>(side: usize) {
+    let [coarse, fine] = [side, 2 * side].map(|side| errors_in_a_box::<D>(side, 0.0));
+    assert_relative_eq!(order(coarse.gradient, fine.gradient), 2.0, epsilon = 0.2);
+    assert_relative_eq!(order(coarse.divergence, fine.divergence), 2.0, epsilon = 0.2);
+    assert_relative_eq!(order(coarse.laplacian, fine.laplacian), 2.0, epsilon = 0.2);
+    // By symmetry the Laplacian has no linear part to remove.
+    assert_relative_eq!(fine.laplacian.mean, fine.corrected_laplacian.mean, max_relative = 1e-3);
+}
+
+#[test]
+fn derivatives_are_of_second_order_on_a_lattice() {
+    second_order_on_a_lattice::<2>(20);
+    second_order_on_a_lattice::<3>(16);
+}
+
+/// At constant h/Δx and disorder the gradient converges. The compact Laplacian does not: Σ slope r_ij is a constant part of 1/Δx,
+/// so that its error grows like 1/Δx; without what it makes of the linear part of the field it stays where it is.
+#[test]
+fn compact_laplacian_diverges_on_disordered_particles_with_its_linear_part_only() {
+    let [coarse, fine] = [40, 80].map(|side| errors_in_a_box::<2>(side, 0.2));
+    assert!(order(coarse.gradient, fine.gradient) > 1.5, "{fine:?}");
+    assert!(order(coarse.divergence, fine.divergence) > 1.5, "{fine:?}");
+    assert_relative_eq!(order(coarse.laplacian, fine.laplacian), -1.0, epsilon = 0.2);
+    assert_relative_eq!(order(coarse.vector_laplacian, fine.vector_laplacian), -1.0, epsilon = 0.2);
+    assert!(order(coarse.corrected_laplacian, fine.corrected_laplacian) > -0.2, "{fine:?}");
+    assert!((0.3..0.7).contains(&fine.laplacian.mean) && fine.corrected_laplacian.mean < 0.05, "{fine:?}");
+}
+
+/// Where a lattice is cut by rings of solid particles, too.
+#[test]
+fn compact_laplacian_errs_in_the_linear_part_around_a_cylinder() {
+    let (side, settings) = (80, common::settings::<2>(1.0 / 80.0, "periodic"));
+    let set = Set::of(common::cylinder(side, 4), &settings, true);
+    let judged = common::fluid_near_cylinder(&set.particles, settings.support_radius());
+    let errors = OperatorErrors::of(&set, &judged);
+    assert!(errors.gradient.max < 0.01 && errors.divergence.max < 0.01, "{errors:?}");
+    assert!(errors.laplacian.mean > 0.1 && errors.corrected_laplacian.mean < 0.03, "{errors:?}");
+    let of_positions = laplacian_of_positions(&set);
+    let largest = judged.iter().map(|&i| of_positions[i].norm() * settings.particle_spacing).fold(0.0, f64::max);
+    assert!((0.05..0.15).contains(&largest), "{largest}");
 }

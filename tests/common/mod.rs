@@ -5,6 +5,10 @@ use alsph::settings::Settings;
 use alsph::{ParticleKind, Particles, Vector};
 use proptest::prelude::*;
 use serde_json::{Value, json};
+use std::f64::consts::{PI, TAU};
+
+pub mod manufactured;
+pub mod set;
 
 /// Settings of a unit box with the same boundary on every side, no bodies but one still one named "wall".
 pub fn settings_value<const D: usize>(particle_spacing: f64, boundary: &str) -> Value {
@@ -57,6 +61,36 @@ pub fn lattice<const D: usize>(side: usize, disorder: f64) -> Vec<Vector<D>> {
             Vector::from_fn(|axis, _| ((i / side.pow(axis as u32) % side) as f64 + 0.5 + disorder * random()) / side as f64)
         })
         .collect()
+}
+
+/// Radius of [`cylinder`].
+pub const RADIUS: f64 = 0.25;
+
+/// Distance from the surface of [`cylinder`], negative inside.
+pub fn distance(x: &Vector<2>) -> f64 {
+    x.add_scalar(-0.5).norm() - RADIUS
+}
+
+/// The lattice of the unit square cut by a cylinder in its middle, of solid particles on rings as `alsph.geometry` places them.
+pub fn cylinder(side: usize, layers: usize) -> Particles<2> {
+    let spacing = 1.0 / side as f64;
+    let mut points = lattice(side, 0.0);
+    points.retain(|x| distance(x) >= 0.0);
+    let fluid = points.len();
+    for radius in (0..layers).map(|layer| RADIUS - (layer as f64 + 0.5) * spacing).take_while(|&radius| radius > 0.0) {
+        let count = 2 * (PI * radius / spacing).round().max(2.0) as usize;
+        let angles = (0..count).map(|k| (k as f64 + 0.5) * TAU / count as f64);
+        points.extend(angles.map(|angle| Vector::from([0.5 + radius * angle.cos(), 0.5 + radius * angle.sin()])));
+    }
+    let mut particles = particles(points);
+    particles.kind[fluid..].fill(ParticleKind::Solid);
+    particles
+}
+
+/// Fluid particles within `reach` of the surface of [`cylinder`].
+pub fn fluid_near_cylinder(particles: &Particles<2>, reach: f64) -> Vec<usize> {
+    let near = |&i: &usize| particles.kind[i] == ParticleKind::Fluid && distance(&particles.position[i]) < reach;
+    (0..particles.real).filter(near).collect()
 }
 
 pub fn boundary() -> impl Strategy<Value = &'static str> {
