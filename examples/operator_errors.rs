@@ -23,9 +23,7 @@ const PLANAR: [(&str, Make<2>); 3] =
 const SPATIAL: [(&str, Make<3>); 2] = [("Lattice, 3-D", lattice), ("Perturbed lattice, 3-D", perturbed)];
 
 fn settings<const D: usize>(side: usize, ratio: f64) -> Settings {
-    let mut value = common::settings_value::<D>(1.0 / side as f64, "periodic");
-    value["smoothing_ratio"] = ratio.into();
-    common::parse(&value)
+    common::compact_settings::<D>(1.0 / side as f64, ratio)
 }
 
 fn box_of<const D: usize>(side: usize, ratio: f64, disorder: f64) -> (Set<D>, Vec<usize>) {

@@ -5,7 +5,7 @@ use crate::lanes::{LANES, Lanes, from, matrices, norm_squared, vectors};
 use crate::neighbours::{Cluster, Entry, NeighbourList, Row, RowMut, Visit, VisitMut};
 use crate::operators::{Neighbours, Nothing, Operator};
 use crate::parallel;
-use crate::particles::{Matrix, Particles, Vector};
+use crate::particles::{Matrix, ParticleKind, Particles, Vector};
 use crate::settings::Settings;
 use crate::with_kernel;
 use std::ops::Range;
@@ -26,8 +26,9 @@ pub struct Stencil<const D: usize> {
     corrected: bool,
     /// The volume in the slopes before they are corrected.
     nominal: f64,
-    /// Whether the Laplacians are corrected for the asymmetry of the neighbours.
-    balanced: bool,
+    /// Whether the Laplacian of a particle is corrected for the asymmetry of its neighbours: that of fluid, if asked for. At the cut
+    /// ends of buffers and walls the asymmetry stays, and makes the compact Laplacian a condition of no flux.
+    balanced: Vec<bool>,
 }
 
 /// What the sums over a particle's neighbours are corrected with.
@@ -59,7 +60,10 @@ impl<const D: usize> Stencil<D> {
         });
         mirror(&mut self.volume);
         self.nominal = nominal;
-        self.balanced = settings.laplacian_correction;
+        self.balanced.resize(real, false);
+        parallel::for_each(&mut self.balanced, |i, balanced| {
+            *balanced = settings.laplacian_correction && particles.kind[i] == ParticleKind::Fluid;
+        });
         self.corrected = false;
     }
 
@@ -81,7 +85,7 @@ impl<const D: usize> Stencil<D> {
             return self.for_each(operator, a, b, f);
         }
         let Self { neighbours, position, volume, correction, .. } = self;
-        let (nominal, balanced) = (self.nominal, self.balanced);
+        let (nominal, balanced) = (self.nominal, &self.balanced[..]);
         neighbours.for_each_mut((correction, a, b), CorrectAndApply { operator, position, volume, nominal, balanced, f });
         self.corrected = true;
     }
@@ -266,7 +270,7 @@ struct Correcting<'a, V, const D: usize> {
     position: &'a [Vector<D>],
     volume: &'a [f64],
     nominal: f64,
-    balanced: bool,
+    balanced: &'a [bool],
     /// −α of the neighbours so far, its lower triangle.
     alpha: [[V; D]; D],
     /// Σ slope r_ij of the neighbours so far.
@@ -327,10 +331,11 @@ impl<V: Lanes, const D: usize> Neighbours<V, D> for Correcting<'_, V, D> {
             }
         }
         let alpha = matrices(self.alpha);
-        let asymmetry = if self.balanced { vectors(self.asymmetry) } else { [Vector::zeros(); LANES] };
+        let asymmetry = vectors(self.asymmetry);
+        let (particles, balanced) = (self.cluster.particles(), self.balanced);
         let corrections = std::array::from_fn(
             #[inline(always)]
-            |lane| Correction::of(&-alpha[lane], asymmetry[lane]),
+            |lane| Correction::of(&-alpha[lane], asymmetry[lane] * f64::from(balanced[particles[lane]])),
         );
         self.correction.copy_from_slice(&corrections[..self.correction.len()]);
         corrections
@@ -343,7 +348,7 @@ struct CorrectAndApply<'a, O, F, const D: usize> {
     position: &'a [Vector<D>],
     volume: &'a [f64],
     nominal: f64,
-    balanced: bool,
+    balanced: &'a [bool],
     f: F,
 }
 

@@ -29,6 +29,14 @@ pub fn settings<const D: usize>(particle_spacing: f64, boundary: &str) -> Settin
     parse(&settings_value::<D>(particle_spacing, boundary))
 }
 
+/// Periodic settings with Laplacians that are not corrected for the asymmetry of the neighbours.
+pub fn compact_settings<const D: usize>(particle_spacing: f64, smoothing_ratio: f64) -> Settings {
+    let mut value = settings_value::<D>(particle_spacing, "periodic");
+    value["laplacian_correction"] = false.into();
+    value["smoothing_ratio"] = smoothing_ratio.into();
+    parse(&value)
+}
+
 pub fn parse(value: &Value) -> Settings {
     Settings::from_json(&value.to_string()).expect("valid settings")
 }
