@@ -65,12 +65,23 @@ class Entry:
 QUICK = (
     Entry("taylor_green", (25, 50), until=1.0),
     Entry("taylor_green", (16, 24), until=0.2, parameters={"dimensions": 3}),
+    Entry("poiseuille", (20, 40), until=2.5),
+    Entry("couette", (20, 40), until=2.5),
+    Entry("cavity", (16, 32), until=16.0, parameters={"reynolds": 100}),
 )
 FULL = (
     Entry("taylor_green", (25, 50, 100), until=1.0),
     Entry("taylor_green", (16, 24, 32), until=1.0, parameters={"dimensions": 3}),
-    Entry("cylinder", (10, 20), until=60.0, parameters={"reynolds": 100}),
-    Entry("cylinder", (10, 20), until=60.0, parameters={"reynolds": 200}),
+    Entry("poiseuille", (20, 40, 80), until=2.5),
+    Entry("couette", (20, 40, 80), until=2.5),
+    Entry("pressure_jump", (20, 40), until=2.0),
+    Entry("cavity", (25, 50, 100), until=24.0, parameters={"reynolds": 100}),
+    Entry("cavity", (50, 100), until=36.0, parameters={"reynolds": 400}),
+    Entry("cavity", (50, 100, 150), until=60.0, parameters={"reynolds": 1000}),
+    Entry("backward_facing_step", (10, 20), until=60.0, parameters={"reynolds": 100}),
+    Entry("backward_facing_step", (10, 20), until=150.0, parameters={"reynolds": 389}),
+    Entry("cylinder", (10, 20, 30), until=60.0, parameters={"reynolds": 100}),
+    Entry("cylinder", (10, 20, 30), until=60.0, parameters={"reynolds": 200}),
 )
 
 
