@@ -67,7 +67,7 @@ QUICK = (
     Entry("taylor_green", (16, 24), until=0.2, parameters={"dimensions": 3}),
     Entry("poiseuille", (20, 40), until=2.5),
     Entry("couette", (20, 40), until=2.5),
-    Entry("cavity", (16, 32), until=16.0, parameters={"reynolds": 100}),
+    Entry("backward_facing_step", (10,), until=40.0, parameters={"reynolds": 100, "downstream": 8.0}),
 )
 FULL = (
     Entry("taylor_green", (25, 50, 100), until=1.0),
