@@ -102,8 +102,8 @@ impl<const D: usize> Operator<D> for Divergence<'_, D> {
 
     #[inline(always)]
     fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [f64; LANES] {
-        let tensor = uncorrected_gradient(near, self.0);
-        corrected_trace(tensor, &near.corrections())
+        let tensor = matrices(uncorrected_gradient(near, self.0));
+        corrected_trace(&tensor, &near.corrections())
     }
 }
 
@@ -127,8 +127,8 @@ impl<const D: usize> Operator<D> for GradientAndLaplacian<'_> {
         let corrections = near.corrections();
         let (gradient, laplacian, linear) = (corrected(gradient, &corrections), laplacian.store(), vectors(linear));
         std::array::from_fn(|lane| {
-            let Correction { inverse, laplacian: factor, asymmetry } = &corrections[lane];
-            (gradient[lane], factor * (laplacian[lane] + (inverse * asymmetry).dot(&linear[lane])))
+            let Correction { laplacian: factor, asymmetry, .. } = &corrections[lane];
+            (gradient[lane], factor * (laplacian[lane] + asymmetry.dot(&linear[lane])))
         })
     }
 }
@@ -168,10 +168,11 @@ impl<const D: usize, F: Fn(usize, usize) -> Vector<D> + Sync> Operator<D> for La
         );
         let corrections = near.corrections();
         let (laplacian, tensor, shown) = (vectors(laplacian), matrices(tensor), matrices(shown));
+        let divergence = corrected_trace(&tensor, &corrections);
         std::array::from_fn(|lane| {
-            let Correction { inverse, laplacian: factor, asymmetry } = &corrections[lane];
-            let linear = (tensor[lane] + shown[lane]) * (inverse * asymmetry);
-            ((laplacian[lane] + linear) * *factor, tensor[lane].component_mul(inverse).sum())
+            let Correction { laplacian: factor, asymmetry, .. } = &corrections[lane];
+            let linear = (tensor[lane] + shown[lane]) * asymmetry;
+            ((laplacian[lane] + linear) * *factor, divergence[lane])
         })
     }
 }
@@ -222,7 +223,6 @@ fn corrected<V: Lanes, const D: usize>(sum: [V; D], corrections: &[Correction<D>
 
 /// Σ_kl α⁻¹_kl T_kl.
 #[inline(always)]
-fn corrected_trace<V: Lanes, const D: usize>(tensor: [[V; D]; D], corrections: &[Correction<D>; LANES]) -> [f64; LANES] {
-    let tensor = matrices(tensor);
+fn corrected_trace<const D: usize>(tensor: &[Matrix<D>; LANES], corrections: &[Correction<D>; LANES]) -> [f64; LANES] {
     std::array::from_fn(|lane| tensor[lane].component_mul(&corrections[lane].inverse).sum())
 }

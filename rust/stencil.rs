@@ -38,7 +38,8 @@ pub struct Correction<const D: usize> {
     pub inverse: Matrix<D>,
     /// −2(D+2) / (2 + tr α).
     pub laplacian: f64,
-    /// Σ slope r_ij: what a uniform gradient adds to the Laplacian where neighbours are not evenly spread; zero if that is to stay.
+    /// α⁻¹ Σ slope r_ij: times the sum of ∇f before its correction, what a uniform gradient takes from the sum of ∇²f where
+    /// neighbours are not evenly spread. Zero if that is to stay.
     pub asymmetry: Vector<D>,
 }
 
@@ -372,12 +373,13 @@ where
 }
 
 impl<const D: usize> Correction<D> {
+    /// From α and Σ slope r_ij.
     #[inline(always)]
     fn of(alpha: &Matrix<D>, asymmetry: Vector<D>) -> Self {
         let inverse = match alpha.try_inverse() {
             Some(inverse) if inverse.norm_squared() < SINGULAR * SINGULAR => inverse,
             _ => Matrix::identity(),
         };
-        Self { inverse, laplacian: -2.0 * (D as f64 + 2.0) / (2.0 + alpha.trace()), asymmetry }
+        Self { inverse, laplacian: -2.0 * (D as f64 + 2.0) / (2.0 + alpha.trace()), asymmetry: inverse * asymmetry }
     }
 }

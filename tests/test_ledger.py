@@ -55,9 +55,8 @@ def test_work_of_the_body_force_and_of_moving_walls(tmp_path, monkeypatch):
     for part, force in (("pressure", 0.0), ("viscous", -0.3)):
         run.history[f"lid_{part}_force_x"], run.history[f"lid_{part}_force_y"] = np.full((2, steps), force)
     still = run.ledger
-    settings = TaylorGreen.settings
     monkeypatch.setattr(TaylorGreen, "bodies", lambda self: [{"name": "lid", "velocity": [2.0, 0.0]}])
-    monkeypatch.setattr(TaylorGreen, "settings", lambda self: settings(self) | {"body_force": [1.0, 0.0]})
+    monkeypatch.setattr(TaylorGreen, "body_force", lambda self: [1.0, 0.0])
     snapshot = Run.snapshot
 
     def moving(self, time=None):

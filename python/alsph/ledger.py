@@ -115,9 +115,8 @@ def _budget(snapshot: Snapshot, case: Case) -> tuple[float, float]:
     position, velocity, volume = snapshot.position[fluid], snapshot.velocity[fluid], spacing**case.space_dimensions
     gradient = sampling.interpolate(*_with_images(position, velocity, case), position, spacing)[1]
     strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
-    settings = case.settings()
-    power = (velocity @ np.array(settings["body_force"])).sum()
-    return 2 * settings["kinematic_viscosity"] * volume * float((strain**2).sum()), volume * float(power)
+    power = (velocity @ np.array(case.body_force())).sum()
+    return 2 * case.kinematic_viscosity * volume * float((strain**2).sum()), volume * float(power)
 
 
 def _with_images(position: FloatArray, velocity: FloatArray, case: Case) -> tuple[FloatArray, FloatArray]:

@@ -63,6 +63,9 @@ fn average<K: Kernel, const D: usize, const N: usize>(
     for entry in stencil.neighbours.row(i).0.flowing() {
         let r_ij = stencil.position[i] - stencil.position[entry.j()];
         let weight = kernel.value(r_ij.norm());
+        if weight == 0.0 {
+            continue; // in the support of another of the cluster, where the value may be stale
+        }
         let value = at(entry.j(), r_ij);
         total += weight;
         for k in 0..N {

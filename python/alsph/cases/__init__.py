@@ -26,6 +26,7 @@ __all__ = [
     "Couette",
     "Cylinder",
     "Poiseuille",
+    "PressureJump",
     "TaylorGreen",
     "find",
 ]

@@ -69,7 +69,7 @@ class Cavity(Case):
 
     def measures(self, run: Run) -> list[Measure]:
         """Return the extrema of the velocities on the centre lines, averaged over the last quarter of the run."""
-        row = next((row for row in reference.rows("cavity_extrema.csv") if float(row["Re"]) == self.reynolds), None)
+        row = reference.row("cavity_extrema.csv", self.reynolds)
         if row is None:
             return []
         u, v = self._centre_lines(run)
@@ -86,10 +86,10 @@ class Cavity(Case):
 
     def profiles(self, run: Run) -> list[Profile]:
         """Return u(y) at x = D/2 and v(x) at y = D/2, averaged over the last quarter of the run."""
-        path = reference.FOLDER / f"cavity_Re{self.reynolds:g}_profile101.csv"
-        if not path.exists():
+        name = f"cavity_Re{self.reynolds:g}_profile101.csv"
+        if not (reference.FOLDER / name).exists():
             return []
-        station, u, v = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
+        station, u, v = reference.table(name)
         computed_u, computed_v = self._centre_lines(run)
         return [
             Profile("u at x = D/2", ("$y/D$", "$u/U$"), (LINE, computed_u), (station, u), SOURCE),

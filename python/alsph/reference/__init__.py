@@ -60,6 +60,11 @@ def rows(name: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+def row(name: str, reynolds: float, column: str = "Re") -> dict[str, str] | None:
+    """Return the row of a CSV file of this folder with that Reynolds number in `column`, None where there is none."""
+    return next((row for row in rows(name) if float(row[column]) == reynolds), None)
+
+
 def table(name: str) -> FloatArray:
     """Return the columns (k, n) of a file of numbers with one line of header."""
     return np.loadtxt(FOLDER / name, delimiter=",", skiprows=1, unpack=True)
@@ -67,5 +72,5 @@ def table(name: str) -> FloatArray:
 
 def _results(name: str, reynolds: float) -> dict[str, float] | None:
     """Return the values in the row of a Reynolds number, None where there is no such row."""
-    row = next((row for row in rows(name) if float(row["Re"]) == reynolds), None)
-    return {name: float(row[column]) for name, column in COLUMNS.items() if column in row} if row else None
+    known = row(name, reynolds)
+    return {name: float(known[column]) for name, column in COLUMNS.items() if column in known} if known else None
