@@ -1,5 +1,6 @@
 //! Artificial particle displacement. (18) (19)
 
+use crate::boundary::Walls;
 use crate::frame::Frame;
 use crate::kernel::{Kernel, Smoothing};
 use crate::lanes::{Lanes, add_product, from, matrices, norm_squared, vectors};
@@ -12,12 +13,14 @@ use crate::stencil::{Corrected, Stencil};
 use crate::with_kernel;
 
 /// Displace the fluid particles towards an even spacing and carry velocity and pressure along to first order.
-/// `particles` stand at r^{n+1}; the derivatives are those of `frame`. `change` is what the particles were last changed by, kept
+/// `particles` stand at r^{n+1}; the derivatives are those of `frame`, where solids show the velocity of the viscous term: the
+/// velocity at rest would make ∇u too small next to a wall, and the displacement mix the boundary layer. `change` is what the particles were last changed by, kept
 /// so that its memory is used again.
 pub fn shift<const D: usize>(
     settings: &Settings,
     particles: &mut Particles<D>,
     frame: &Frame<D>,
+    walls: &Walls<D>,
     time_step: f64,
     velocity_max: f64,
     change: &mut Vec<Change<D>>,
@@ -30,7 +33,7 @@ pub fn shift<const D: usize>(
     with_kernel!(settings.kernel, K => {
         let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
         let stencil = &frame.stencil;
-        let displacement = Displacement { settings, kernel, particles, stencil, time_step, velocity_max };
+        let displacement = Displacement { settings, kernel, particles, stencil, walls, time_step, velocity_max };
         stencil.neighbours.for_each(change, &mut vec![(); particles.real], displacement);
     });
     let Particles { real, position, velocity, pressure, .. } = particles;
@@ -48,6 +51,7 @@ struct Displacement<'a, K, const D: usize> {
     kernel: Smoothing<K>,
     particles: &'a Particles<D>,
     stencil: &'a Stencil<D>,
+    walls: &'a Walls<D>,
     time_step: f64,
     velocity_max: f64,
 }
@@ -62,13 +66,24 @@ impl<K: Kernel, const D: usize> Visit<Change<D>, ()> for Displacement<'_, K, D> 
         let (u, p): ([V; D], V) = (cluster.vectors(velocity), cluster.lanes(|i| pressure[i]));
         let (mut velocity_gradient, mut pressure_gradient) = ([[V::zero(); D]; D], [V::zero(); D]);
         let Stencil { position, correction, .. } = self.stencil;
-        Corrected { cluster, row, position, correction }.for_each(
+        let mut near = Corrected { cluster, row, position, correction };
+        near.for_each_flowing(
             #[inline(always)]
             |j, slope: V, r_ij| {
                 for k in 0..D {
                     add_product(&mut velocity_gradient[k], (V::splat(velocity[j][k]) - u[k]) * slope, r_ij);
                 }
                 add_product(&mut pressure_gradient, (V::splat(pressure[j]) - p) * slope, r_ij);
+            },
+        );
+        near.for_each_solid(
+            #[inline(always)]
+            |s, slope: V, r_ij| {
+                let seen = cluster.particles().map(|i| self.walls.seen_by(self.particles, s, i));
+                for k in 0..D {
+                    add_product(&mut velocity_gradient[k], (V::load(&seen.map(|u| u[k])) - u[k]) * slope, r_ij);
+                }
+                add_product(&mut pressure_gradient, (V::splat(pressure[s]) - p) * slope, r_ij);
             },
         );
         let (velocity_gradient, pressure_gradient) = (matrices(velocity_gradient), vectors(pressure_gradient));

@@ -10,7 +10,7 @@ use crate::operators::VelocityGradient;
 use crate::parallel;
 use crate::particles::{Matrix, ParticleKind, Particles, Vector};
 use crate::report::{Clock, Report};
-use crate::scheme::{Alsph, Step};
+use crate::scheme::{self, Alsph, Step};
 use crate::settings::{Boundary, Settings};
 use crate::shifting::{Change, shift};
 use rayon::ThreadPool;
@@ -33,6 +33,7 @@ pub struct Simulation<const D: usize> {
     scheme: Alsph<D>,
     change: Vec<Change<D>>,
     largest_eigenvalue: f64,
+    relaxation: f64,
     /// Whether `frame` belongs to the present positions.
     prepared: bool,
     history: Vec<Report<D>>,
@@ -57,6 +58,7 @@ impl<const D: usize> Simulation<D> {
         Ok(Self {
             walls: Walls::new(&settings),
             largest_eigenvalue: settings.largest_laplacian_eigenvalue(),
+            relaxation: scheme::relaxation(&settings),
             settings,
             particles,
             clock,
@@ -126,7 +128,7 @@ impl<const D: usize> Simulation<D> {
         let time_step = self.time_step(velocity_max)?;
         self.prepare();
         let penalty = self.settings.penalty_constant * velocity_max * velocity_max * time_step;
-        let step = Step { settings: &self.settings, time_step, penalty };
+        let step = Step { settings: &self.settings, time_step, penalty, relaxation: self.relaxation };
 
         let outcome = self.scheme.iterate(step, &mut self.particles, &mut self.frame, &mut self.walls);
         if let Err(error) = self.check_fields(time_step) {
@@ -136,7 +138,7 @@ impl<const D: usize> Simulation<D> {
         let loads = loads(step.settings, &self.particles, &self.frame, &self.walls);
         let mut report = Report::new(step, outcome, &self.particles, &self.frame.stencil.volume, velocity_max, loads);
         self.scheme.advance_positions(step, &mut self.particles, &self.frame); // (12)
-        shift(step.settings, &mut self.particles, &self.frame, time_step, velocity_max, &mut self.change); // (18) (19)
+        shift(step.settings, &mut self.particles, &self.frame, &self.walls, time_step, velocity_max, &mut self.change); // (18) (19)
         self.end_step(time_step);
         report.clock = self.clock;
         report.counts = self.particles.counts();

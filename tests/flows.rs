@@ -50,6 +50,35 @@ fn taylor_green_decays_as_the_exact_solution() {
     }
 }
 
+/// What is added to a solenoidal velocity as a gradient, sweeps take off again, with any disorder of the particles.
+#[test]
+fn projection_leaves_the_solenoidal_part() {
+    let one_step = |sweeps: usize| {
+        let mut value = common::settings_value::<2>(1.0 / 32.0, "periodic");
+        value["max_iterations"] = 1.into();
+        value["projection_sweeps"] = sweeps.into();
+        value["shifting"] = "none".into();
+        let mut particles = taylor_green(32, 0.2);
+        for i in 0..particles.real {
+            let [x, y] = [0, 1].map(|k| 2.0 * PI * particles.position[i][k]);
+            particles.velocity[i] += Vector::from([x.sin() * y.cos(), x.cos() * y.sin()]) * 0.3;
+        }
+        let mut simulation = Simulation::new(common::parse(&value), particles, Clock::default(), Some(2)).expect("valid");
+        simulation.advance(1, None).expect("stable");
+        let divergence = simulation.take_history().pop().expect("a step was taken").outcome.divergence_sum;
+        let particles = simulation.particles();
+        let error = (0..particles.real).map(|i| {
+            let [x, y] = [0, 1].map(|k| 2.0 * PI * particles.position[i][k]);
+            (particles.velocity[i] - Vector::from([-x.cos() * y.sin(), x.sin() * y.cos()])).norm()
+        });
+        (error.sum::<f64>() / particles.real as f64, divergence / particles.real as f64)
+    };
+    let ((error, divergence), (error_left, divergence_left)) = (one_step(0), one_step(60));
+    assert!(error > 0.15 && divergence > 0.8, "{error} {divergence}");
+    assert!(error_left < 0.02 * error + 0.01, "{error_left} of {error}");
+    assert!(divergence_left < 0.02 * divergence, "{divergence_left} of {divergence}");
+}
+
 #[test]
 fn taylor_green_in_3d_keeps_its_plane_flow() {
     // The 2-D vortex, uniform in z, is an exact solution in 3-D too.
@@ -199,7 +228,8 @@ fn symmetric_flow_has_no_lift() {
         simulation.advance_until(0.5, None).expect("stable");
         for report in simulation.take_history() {
             let load = &report.loads[0];
-            assert!((load.pressure_force[1] + load.viscous_force[1]).abs() < 1e-7, "lift {:?}", load);
+            // Slopes are of single precision, and the wake amplifies their rounding.
+            assert!((load.pressure_force[1] + load.viscous_force[1]).abs() < 1e-6, "lift {:?}", load);
         }
     }
 }

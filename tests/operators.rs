@@ -1,5 +1,6 @@
 //! The operators on disordered particles: exact for linear fields, consistent for quadratic ones, in 2-D and 3-D.
 
+use alsph::boundary::Walls;
 use alsph::kernel::{Kernel, QuinticSpline, Smoothing, WendlandC2, WendlandC4};
 use alsph::lanes::{LANES, Portable};
 use alsph::neighbours::{Cluster, brute_force_neighbours};
@@ -176,13 +177,19 @@ fn shift_is_that_of_plain_sums() {
     set.particles.pressure = set.field(|x| x[0] - (3.0 * x[1]).cos());
     let velocity_gradient = set.apply(VelocityGradient(&set.particles.velocity));
     let pressure_gradient = set.apply(Gradient(&set.particles.pressure));
+    // The solids themselves are at rest, but not what they show.
+    let mut walls = Walls::new(&settings);
+    walls.viscous_velocity = set.particles.velocity.clone();
+    let solids = (0..set.particles.real).filter(|&i| set.particles.kind[i] == ParticleKind::Solid).collect::<Vec<_>>();
+    assert!(!solids.is_empty());
+    solids.into_iter().for_each(|i| set.particles.velocity[i] = Vector::zeros());
     let in_frame = set.particles.position.clone();
     for (i, x) in set.particles.position.iter_mut().enumerate() {
         *x += Vector::from([(i as f64).cos(), (i as f64).sin()]) * 0.002;
     }
     let before = set.particles.clone();
     let time_step = 1e-4;
-    shift(&settings, &mut set.particles, &set.frame, time_step, 1.0, &mut Vec::new());
+    shift(&settings, &mut set.particles, &set.frame, &walls, time_step, 1.0, &mut Vec::new());
     let smoothing = Smoothing::<QuinticSpline>::new(settings.smoothing_length(), 2);
     let near = brute_force_neighbours(&in_frame, before.real, settings.support_radius());
     let mut moved = 0;

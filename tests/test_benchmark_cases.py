@@ -265,3 +265,24 @@ def test_wide_domain_of_the_cylinder_is_possible():
     case = Cylinder(height=60.0, upstream=30.0, length=90.0, resolution=8)
     assert case.domain()["upper"] == [90, 30]
     assert case.particle_estimate() == pytest.approx(90 * 60 * 64, rel=0.05)
+
+
+def test_projection_of_a_uniform_stream_is_potential_flow():
+    case = Cylinder(
+        reynolds=1e6, perturbation=0, resolution=10, length=6, height=6, upstream=3, max_iterations=1, projection_sweeps=1000
+    )
+    simulation = case.simulation(threads=1)
+    simulation.advance(1)
+    state = simulation.snapshot()
+    x, y = (state["position"] - case.centre).T
+    r, angle = np.hypot(x, y), np.arctan2(y, x)
+    ring = (state["kind"] == Kind.FLUID) & (r > 0.75) & (r < 1.5)
+    u, v = state["velocity"][ring].T
+    cosine, sine, inverse = np.cos(angle[ring]), np.sin(angle[ring]), r[ring] ** -2
+    # u_r = (A - B/r²) cos θ, u_θ = -(A + B/r²) sin θ: a stream A past a cylinder of radius sqrt(B/A).
+    matrix = np.concatenate([np.stack([cosine, -cosine * inverse], 1), np.stack([-sine, -sine * inverse], 1)])
+    values = np.concatenate([u * cosine + v * sine, v * cosine - u * sine])
+    (stream, doublet), *_ = np.linalg.lstsq(matrix, values)
+    assert stream == pytest.approx(1.0, abs=0.04)
+    assert np.sqrt(doublet / stream) == pytest.approx(0.5, rel=0.02)
+    assert np.abs(matrix @ (stream, doublet) - values).mean() < 0.02

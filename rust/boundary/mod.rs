@@ -5,5 +5,5 @@ mod open;
 mod solid;
 
 pub use images::Images;
-pub use open::{MassFlow, end_step, inlet_depth};
-pub use solid::{Walls, shepard};
+pub use open::{MassFlow, deep_in_inlet, end_step};
+pub use solid::{Walls, extrapolate, shepard};

@@ -63,10 +63,15 @@ fn sides(settings: &Settings) -> Vec<Side> {
         .collect()
 }
 
-/// How far a position lies in the inlet buffer, beyond the inlet's plane; negative inside the domain, −∞ without an inlet.
-pub fn inlet_depth<const D: usize>(settings: &Settings) -> impl Fn(&Vector<D>) -> f64 + Sync {
+/// Whether a particle lies so deep in an inlet buffer that all it sees is prescribed, and cut off at the buffer's end: its
+/// divergence says nothing about the flow.
+pub fn deep_in_inlet<const D: usize>(settings: &Settings) -> impl Fn(ParticleKind, &Vector<D>) -> bool + Sync {
     let inlets: Vec<Side> = sides(settings).into_iter().filter(|side| side.kind == Boundary::Inlet).collect();
-    move |position| outermost(&inlets, position).map_or(f64::NEG_INFINITY, |(inside, _)| -inside)
+    let radius = settings.support_radius();
+    move |kind, position| {
+        let depth = || outermost(&inlets, position).map_or(f64::NEG_INFINITY, |(inside, _)| -inside);
+        kind == ParticleKind::Inlet && depth() > radius
+    }
 }
 
 /// The side that `position` is farthest beyond, or nearest to, and its distance inside it.

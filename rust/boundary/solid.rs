@@ -5,6 +5,7 @@ use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{Settings, WallVelocity};
 use crate::stencil::Stencil;
 use crate::with_kernel;
+use rayon::prelude::*;
 
 /// Largest ratio of the distances of solid and fluid from the surface: β_max − 1 of Morris, Fox and Zhu (1997).
 const LARGEST_DISTANCE_RATIO: f64 = 0.5;
@@ -50,6 +51,22 @@ pub fn shepard<const D: usize, const N: usize>(
     at: impl Fn(usize, Vector<D>) -> [f64; N],
 ) -> Option<[f64; N]> {
     with_kernel!(settings.kernel, K => average(Smoothing::<K>::new(settings.smoothing_length(), D), stencil, i, at))
+}
+
+/// Give each solid particle of `field` the Shepard average of what `at(field, j, r_ij)` says of the flowing neighbours; zero
+/// without neighbours. `kind` is that of the real particles.
+pub fn extrapolate<const D: usize>(
+    settings: &Settings,
+    stencil: &Stencil<D>,
+    kind: &[ParticleKind],
+    field: &mut [f64],
+    at: impl Fn(&[f64], usize, Vector<D>) -> f64 + Sync,
+) {
+    let values = &*field;
+    let average = |i| shepard(settings, stencil, i, |j, r_ij| [at(values, j, r_ij)]).map_or(0.0, |[average]| average);
+    let solids = (0..kind.len()).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
+    let extrapolated: Vec<(usize, f64)> = solids.map(|i| (i, average(i))).collect();
+    extrapolated.into_iter().for_each(|(i, value)| field[i] = value);
 }
 
 fn average<K: Kernel, const D: usize, const N: usize>(

@@ -1,12 +1,12 @@
 //! The ALSPH step: equations (8) to (13) of the paper.
 
-use crate::boundary::{Walls, inlet_depth, shepard};
+use crate::boundary::{Walls, deep_in_inlet, extrapolate, shepard};
 use crate::frame::Frame;
 use crate::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, vector_laplacian};
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
+use crate::scheme::projection::Projection;
 use crate::settings::{DerivativeFrame, Settings, VelocityLaplacian, WallPressure, WallVelocity};
-use rayon::prelude::*;
 
 /// How a step ended.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,6 +35,7 @@ pub struct Alsph<const D: usize> {
     pressure_laplacian: Vec<f64>,
     /// ∇p^m near solids, where the pressure is continued into them.
     pressure_gradient: Vec<Vector<D>>,
+    projection: Projection,
 }
 
 /// What stays the same during one step.
@@ -45,6 +46,8 @@ pub struct Step<'a> {
     pub time_step: f64,
     /// r_AL.
     pub penalty: f64,
+    /// σ of the projection sweeps, a length squared.
+    pub relaxation: f64,
 }
 
 impl<const D: usize> Alsph<D> {
@@ -63,6 +66,9 @@ impl<const D: usize> Alsph<D> {
             self.predict_velocity(step, particles, frame); // (8)
             self.update_pressure(step, particles, frame); // (10) (20)
             self.correct_velocity(step, particles, frame); // (11)
+            if iteration == step.settings.max_iterations {
+                self.projection.sweep(step, particles, frame);
+            }
             if step.settings.derivative_frame == DerivativeFrame::Updated {
                 self.advance_positions(step, particles, frame); // (12): Algorithm 1 takes its derivatives at r^{n+1,m}
                 frame.update(step.settings, particles);
@@ -155,15 +161,13 @@ impl<const D: usize> Alsph<D> {
         }
         let Particles { real, kind, normal, position, pressure, .. } = particles;
         let (kind, normal) = (&*kind, &*normal);
-        let Step { settings, time_step: dt, penalty } = step;
+        let Step { settings, time_step: dt, penalty, .. } = step;
         let paper_walls = settings.wall_pressure == WallPressure::Paper;
         let (star, initial, laplacian) = (&self.velocity_star, &self.velocity_initial, &self.pressure_laplacian);
-        let (position, inlet_depth) = (&*position, inlet_depth(settings));
-        let deep = |i: usize| kind[i] == ParticleKind::Inlet && inlet_depth(&position[i]) > settings.support_radius();
+        let (position, deep_in_inlet) = (&*position, deep_in_inlet(settings));
         frame.stencil.for_each_one(Divergence(star), &mut pressure[..*real], |i, divergence, p| {
             let solid = kind[i] == ParticleKind::Solid;
-            // Deep in the inlet the velocity is all prescribed, and cut off at the end of the buffer.
-            let divergence = if deep(i) { 0.0 } else { divergence };
+            let divergence = if deep_in_inlet(kind[i], &position[i]) { 0.0 } else { divergence };
             if kind[i] == ParticleKind::Outlet {
                 *p = 0.0;
             } else if !solid || paper_walls {
@@ -185,16 +189,13 @@ impl<const D: usize> Alsph<D> {
     /// eq. 27; bodies do not accelerate) or continued along its gradient.
     fn extrapolate_wall_pressure(&self, settings: &Settings, particles: &mut Particles<D>, frame: &Frame<D>) {
         let gravity = Vector::<D>::from_column_slice(&settings.body_force);
-        let Particles { real, kind, pressure, .. } = &*particles;
+        let Particles { real, kind, pressure, .. } = particles;
         let gradient = |j: usize| match settings.wall_pressure {
             WallPressure::Linear => self.pressure_gradient[j],
             _ => gravity * settings.density,
         };
-        let at = |j: usize, r_ij: Vector<D>| [pressure[j] + gradient(j).dot(&r_ij)];
-        let solids = (0..*real).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
-        let average = |i| (i, shepard(settings, &frame.stencil, i, at).map_or(0.0, |[average]| average));
-        let extrapolated: Vec<(usize, f64)> = solids.map(average).collect();
-        extrapolated.into_iter().for_each(|(i, p)| particles.pressure[i] = p);
+        let continued = |pressure: &[f64], j: usize, r_ij: Vector<D>| pressure[j] + gradient(j).dot(&r_ij);
+        extrapolate(settings, &frame.stencil, &kind[..*real], pressure, continued);
     }
 
     /// u^{m+1} (11). Buffers and solids keep their velocities.

@@ -52,7 +52,10 @@ class Case(Parameters):
         default=2,
         description="derivatives at updated positions (1), initial positions (2), or 1 with a search every iteration",
     )
-    max_iterations: int = Field(default=5, ge=1, description="cap of the inner iterations of a step [-]")
+    max_iterations: int = Field(default=2, ge=1, description="cap of the inner iterations of a step [-]")
+    projection_sweeps: int = Field(
+        default=4, ge=0, description="projection sweeps after the iterations of a step, 0 in the paper [-]"
+    )
     tolerance: float = Field(default=1e-3, gt=0, description="largest |∇·u| at which the iterations end, ε [U/D]")
     penalty_constant: float = Field(default=100.0, ge=1, le=100, description="penalty constant C_BV = (c/u_max)² [-]")
     smoothing_ratio: float = Field(
@@ -157,7 +160,7 @@ class Case(Parameters):
     def settings(self) -> dict[str, Any]:
         """Return the engine's settings (see docs/architecture.md)."""
         shared = (
-            "smoothing_ratio kernel adaptive_time_step time_step_safety max_iterations penalty_constant "
+            "smoothing_ratio kernel adaptive_time_step time_step_safety max_iterations projection_sweeps penalty_constant "
             "velocity_laplacian laplacian_correction shifting shift_coefficient shift_limit wall_velocity wall_pressure"
         )
         return {name: getattr(self, name) for name in shared.split()} | {
