@@ -268,9 +268,8 @@ def test_wide_domain_of_the_cylinder_is_possible():
 
 
 def test_projection_of_a_uniform_stream_is_potential_flow():
-    case = Cylinder(
-        reynolds=1e6, perturbation=0, resolution=10, length=6, height=6, upstream=3, max_iterations=1, projection_sweeps=1000
-    )
+    channel = {"length": 6, "height": 6, "upstream": 3, "resolution": 10, "perturbation": 0}
+    case = Cylinder(reynolds=1e6, max_iterations=1, projection_sweeps=1000, **channel)
     simulation = case.simulation(threads=1)
     simulation.advance(1)
     state = simulation.snapshot()

@@ -160,8 +160,9 @@ class Case(Parameters):
     def settings(self) -> dict[str, Any]:
         """Return the engine's settings (see docs/architecture.md)."""
         shared = (
-            "smoothing_ratio kernel adaptive_time_step time_step_safety max_iterations projection_sweeps penalty_constant "
-            "velocity_laplacian laplacian_correction shifting shift_coefficient shift_limit wall_velocity wall_pressure"
+            "smoothing_ratio kernel adaptive_time_step time_step_safety max_iterations projection_sweeps "
+            "penalty_constant velocity_laplacian laplacian_correction shifting shift_coefficient shift_limit "
+            "wall_velocity wall_pressure"
         )
         return {name: getattr(self, name) for name in shared.split()} | {
             "dimensions": self.space_dimensions,
