@@ -106,6 +106,14 @@ def test_diverged_run_keeps_the_last_good_state(small, tmp_path):
     assert alsph.open_run(tmp_path / "run").status == "diverged"
 
 
+def test_a_run_that_does_not_know_all_parameters_is_not_resumed(small, tmp_path):
+    run = small.run(tmp_path / "run", until=0.02, progress=False)
+    file = run.path / "case.toml"
+    file.write_text("".join(line for line in file.read_text().splitlines(True) if "projection_sweeps" not in line))
+    with pytest.raises(RunFolderError, match=r"does not say what projection_sweeps was.*add the values"):
+        resume(run.path, until=0.04, progress=False)
+
+
 def test_disk_that_fills_up_leaves_a_folder_that_resumes(small, tmp_path, monkeypatch):
     usage, append = shutil.disk_usage(tmp_path), io.RunFolder.append_surface
 

@@ -58,6 +58,11 @@ def resume(path: str | Path, until: float | None = None, threads: int | None = N
     folder = RunFolder(Path(path))
     config, info = folder.config(), folder.info()
     folder.check_idle()
+    if unknown := [name for name in config.case.parameter_names() if name not in config.case.model_fields_set]:
+        raise RunFolderError(
+            f"{path}/case.toml does not say what {', '.join(unknown)} was: the run is of an older version, and the "
+            "defaults of this one would change its method; add the values that it was made with, or run it again"
+        )
     changes = {name: value for name, value in (("until", until), ("threads", threads)) if value is not None}
     config = Config(config.case, config.run.replace(**changes))
     state = folder.read_checkpoint()
