@@ -27,14 +27,16 @@ CODES = {
 
 CASES = {
     "cylinder": [
-        ("alsph", ["cylinder", "--resolution=20", "--algorithm=2"]),
-        ("alsph", ["cylinder", "--resolution=20", "--algorithm=1"]),
+        ("alsph", ["cylinder", "--resolution=20"]),
+        ("alsph", ["cylinder", "--resolution=20", "--paper"]),
+        ("alsph", ["cylinder", "--resolution=20", "--paper", "--algorithm=1"]),
         ("pysph", ["cylinder", "--resolution=20", "--cache"]),
         ("pysph", ["cylinder", "--resolution=20"]),
     ],
     "taylor_green": [
-        ("alsph", ["taylor_green", "--resolution=50", "--algorithm=2"]),
-        ("alsph", ["taylor_green", "--resolution=50", "--algorithm=1"]),
+        ("alsph", ["taylor_green", "--resolution=50"]),
+        ("alsph", ["taylor_green", "--resolution=50", "--paper"]),
+        ("alsph", ["taylor_green", "--resolution=50", "--paper", "--algorithm=1"]),
         ("pysph", ["taylor_green", "--resolution=50", "--scheme=edac", "--cache"]),
         ("pysph", ["taylor_green", "--resolution=50", "--scheme=edac", "--cache", "--smoothing-ratio=1"]),
         ("pysph", ["taylor_green", "--resolution=50", "--scheme=tvf", "--cache", "--smoothing-ratio=1"]),
