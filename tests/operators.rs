@@ -299,6 +299,17 @@ fn largest_laplacian_eigenvalue_is_that_of_the_stability_law() {
     }
 }
 
+#[test]
+fn largest_projection_eigenvalue_is_that_of_a_plain_sum() {
+    // From a separate program, over a finer set of wave vectors.
+    for (ratio, expected) in [(1.0, 0.7476), (1.2, 0.5206), (4.0 / 3.0, 0.4211), (1.6, 0.2928), (2.0, 0.1872)] {
+        let mut value = common::settings_value::<2>(0.05, "periodic");
+        value["smoothing_ratio"] = ratio.into();
+        let eigenvalue = common::parse(&value).largest_projection_eigenvalue();
+        assert_relative_eq!(eigenvalue, expected, max_relative = 0.02);
+    }
+}
+
 /// Errors on a periodic lattice displaced by up to `disorder` spacings.
 fn errors_in_a_box<const D: usize>(side: usize, disorder: f64) -> OperatorErrors {
     let settings = common::compact_settings::<D>(1.0 / side as f64, 4.0 / 3.0);
