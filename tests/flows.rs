@@ -7,9 +7,13 @@ use std::f64::consts::PI;
 
 mod common;
 
-const ALGORITHMS: [(&str, bool); 3] = [("initial", false), ("updated", false), ("updated", true)];
+/// Derivative frame, whether the search is repeated, and projection sweeps: the paper's, and with sweeps.
+type Algorithm = (&'static str, bool, usize);
+const ALGORITHMS: [Algorithm; 5] =
+    [("initial", false, 0), ("updated", false, 0), ("updated", true, 0), ("initial", false, 4), ("updated", false, 4)];
 
-fn with_algorithm(mut value: Value, (frame, search): (&str, bool)) -> Settings {
+fn with_algorithm(mut value: Value, (frame, search, sweeps): Algorithm) -> Settings {
+    value["projection_sweeps"] = sweeps.into();
     value["derivative_frame"] = frame.into();
     value["search_every_iteration"] = search.into();
     common::parse(&value)
@@ -225,11 +229,12 @@ fn symmetric_flow_has_no_lift() {
         let (value, particles) = channel(24, true);
         let mut simulation =
             Simulation::new(with_algorithm(value, algorithm), particles, Clock::default(), Some(2)).expect("valid");
-        simulation.advance_until(0.5, None).expect("stable");
+        // Rounding grows from 1e-16 tenfold about every 25 steps, a little faster with sweeps.
+        let until = if algorithm.2 == 0 { 0.5 } else { 0.4 };
+        simulation.advance_until(until, None).expect("stable");
         for report in simulation.take_history() {
             let load = &report.loads[0];
-            // Slopes are of single precision, and the wake amplifies their rounding.
-            assert!((load.pressure_force[1] + load.viscous_force[1]).abs() < 1e-6, "lift {:?}", load);
+            assert!((load.pressure_force[1] + load.viscous_force[1]).abs() < 1e-7, "{algorithm:?}: lift {load:?}");
         }
     }
 }

@@ -292,9 +292,7 @@ fn volumes_on_a_lattice_are_those_of_its_cells() {
 fn largest_laplacian_eigenvalue_is_that_of_the_stability_law() {
     // Method, section 3.
     for (ratio, expected) in [(1.0, 3.84), (1.2, 2.69), (4.0 / 3.0, 2.17), (1.6, 1.51), (2.0, 0.97)] {
-        let mut value = common::settings_value::<2>(0.05, "periodic");
-        value["smoothing_ratio"] = ratio.into();
-        let eigenvalue = common::parse(&value).largest_laplacian_eigenvalue();
+        let eigenvalue = common::compact_settings::<2>(0.05, ratio).largest_laplacian_eigenvalue();
         assert_relative_eq!(eigenvalue, expected, epsilon = 0.01);
     }
 }
@@ -303,9 +301,7 @@ fn largest_laplacian_eigenvalue_is_that_of_the_stability_law() {
 fn largest_projection_eigenvalue_is_that_of_a_plain_sum() {
     // From a separate program, over a finer set of wave vectors.
     for (ratio, expected) in [(1.0, 0.7476), (1.2, 0.5206), (4.0 / 3.0, 0.4211), (1.6, 0.2928), (2.0, 0.1872)] {
-        let mut value = common::settings_value::<2>(0.05, "periodic");
-        value["smoothing_ratio"] = ratio.into();
-        let eigenvalue = common::parse(&value).largest_projection_eigenvalue();
+        let eigenvalue = common::compact_settings::<2>(0.05, ratio).largest_projection_eigenvalue();
         assert_relative_eq!(eigenvalue, expected, max_relative = 0.02);
     }
 }

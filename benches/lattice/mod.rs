@@ -10,7 +10,6 @@ mod common;
 pub fn settings<const D: usize>(side: usize, derivative_frame: &str) -> Settings {
     let mut value = common::settings_value::<D>(1.0 / side as f64, "periodic");
     value["derivative_frame"] = derivative_frame.into();
-    value["projection_sweeps"] = 0.into();
     value["divergence_tolerance"] = 1e-12.into();
     common::parse(&value)
 }
