@@ -91,8 +91,9 @@ fn force_on<const D: usize>(
         let slope = entry.slope(lane);
         let r_sf = stencil.position[s] - stencil.position[f];
         pressure -= r_sf * (slope * (particles.pressure[s] + particles.pressure[f]));
-        let seen = walls.seen_by(particles, s, f);
-        viscous += (particles.velocity[f] - seen) * (-slope * 2.0 * viscosity);
+        let dispersion = |i: usize| walls.dispersion.get(i).copied().unwrap_or_else(Vector::zeros);
+        let relative = (particles.velocity[f] - dispersion(f)) - (walls.seen_by(particles, s, f) - dispersion(s));
+        viscous += relative * (-slope * 2.0 * viscosity);
     }
     (pressure * stencil.volume[s], viscous * stencil.volume[s])
 }

@@ -45,6 +45,8 @@ pub enum WallVelocity {
     Paper,
     /// 2 u_wall minus the Shepard average of the fluid's (Adami, Hu and Adams 2012).
     Adami,
+    /// On the cubic through u_wall at the surface that fits the fluid above it best.
+    Cubic,
     /// Per pair, linear through u_wall at the surface, with the ratio of distances limited (Morris, Fox and Zhu 1997).
     Morris,
 }
@@ -129,6 +131,8 @@ pub struct Settings {
     pub velocity_laplacian: VelocityLaplacian,
     /// Correct the scalar Laplacians so that they vanish for linear fields on any particle arrangement.
     pub laplacian_correction: bool,
+    /// Order of the viscous term in the particle spacing, 2 or 4.
+    pub viscous_order: u8,
     pub shifting: Shifting,
     /// β of the maximum-velocity shift.
     pub shift_coefficient: f64,
@@ -208,6 +212,13 @@ impl Settings {
             (0..3).map(|k| gradient(k).powi(2)).sum()
         };
         self.largest_over_waves(eigenvalue)
+    }
+
+    /// The compact Laplacian of a wave of wave number k along an axis of a square lattice is −k² (1 − c k²Δx² + ...): c.
+    pub fn laplacian_dispersion(&self) -> f64 {
+        let (slopes, trace) = self.lattice_slopes();
+        let factor = 2.0 * (self.dimensions as f64 + 2.0) / (2.0 + trace);
+        slopes.iter().map(|(r, slope)| -factor * slope * r[0].powi(4) / 24.0).sum()
     }
 
     /// V_j |∇W|/r, negative, at the points of the unit lattice around the origin, and tr α.

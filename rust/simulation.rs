@@ -34,6 +34,7 @@ pub struct Simulation<const D: usize> {
     change: Vec<Change<D>>,
     largest_eigenvalue: f64,
     relaxation: f64,
+    dispersion: f64,
     /// Whether `frame` belongs to the present positions.
     prepared: bool,
     history: Vec<Report<D>>,
@@ -59,6 +60,7 @@ impl<const D: usize> Simulation<D> {
             walls: Walls::new(&settings),
             largest_eigenvalue: settings.largest_laplacian_eigenvalue(),
             relaxation: scheme::relaxation(&settings),
+            dispersion: settings.laplacian_dispersion() * settings.particle_spacing.powi(2),
             settings,
             particles,
             clock,
@@ -128,7 +130,8 @@ impl<const D: usize> Simulation<D> {
         let time_step = self.time_step(velocity_max)?;
         self.prepare();
         let penalty = self.settings.penalty_constant * velocity_max * velocity_max * time_step;
-        let step = Step { settings: &self.settings, time_step, penalty, relaxation: self.relaxation };
+        let (relaxation, dispersion) = (self.relaxation, self.dispersion);
+        let step = Step { settings: &self.settings, time_step, penalty, relaxation, dispersion };
 
         let outcome = self.scheme.iterate(step, &mut self.particles, &mut self.frame, &mut self.walls);
         if let Err(error) = self.check_fields(time_step) {
@@ -138,6 +141,7 @@ impl<const D: usize> Simulation<D> {
         let loads = loads(step.settings, &self.particles, &self.frame, &self.walls);
         let mut report = Report::new(step, outcome, &self.particles, &self.frame.stencil.volume, velocity_max, loads);
         self.scheme.advance_positions(step, &mut self.particles, &self.frame); // (12)
+        self.walls.see_for_shift(step.settings, &self.particles, &self.frame);
         shift(step.settings, &mut self.particles, &self.frame, &self.walls, time_step, velocity_max, &mut self.change); // (18) (19)
         self.end_step(time_step);
         report.clock = self.clock;

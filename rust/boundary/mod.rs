@@ -2,8 +2,9 @@
 
 mod images;
 mod open;
+mod profile;
 mod solid;
 
 pub use images::Images;
 pub use open::{MassFlow, deep_in_inlet, end_step};
-pub use solid::{Walls, extrapolate, shepard};
+pub use solid::{Walls, extrapolate};

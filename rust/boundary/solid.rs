@@ -1,6 +1,9 @@
 //! Solid walls: what velocity and pressure a solid particle shows to the fluid. (20)
 
+use crate::boundary::profile::continued;
+use crate::frame::Frame;
 use crate::kernel::{Kernel, Smoothing};
+use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{Settings, WallVelocity};
 use crate::stencil::Stencil;
@@ -16,11 +19,72 @@ pub struct Walls<const D: usize> {
     rule: WallVelocity,
     /// Velocity that solid particles show to the viscous term, real particles and images (not used by the pairwise rule).
     pub viscous_velocity: Vec<Vector<D>>,
+    /// What the viscous term takes off the velocity of each particle to be of fourth order, real particles and images; empty at
+    /// second order. See [`Walls::sharpen`].
+    pub dispersion: Vec<Vector<D>>,
 }
 
 impl<const D: usize> Walls<D> {
     pub fn new(settings: &Settings) -> Self {
-        Self { rule: settings.wall_velocity, viscous_velocity: Vec::new() }
+        Self { rule: settings.wall_velocity, viscous_velocity: Vec::new(), dispersion: Vec::new() }
+    }
+
+    /// Renew the velocities that solid particles show to the viscous term.
+    pub fn see(&mut self, settings: &Settings, particles: &Particles<D>, frame: &Frame<D>) {
+        match self.rule {
+            WallVelocity::Paper | WallVelocity::Morris => {}
+            WallVelocity::Adami => self.mirror(settings, particles, frame),
+            WallVelocity::Cubic => {
+                let velocity = &particles.velocity;
+                let basis = |n: f64| [n, n * n / 2.0, n * n * n / 6.0];
+                let seen = continued(settings, particles, &frame.stencil, velocity, |s| velocity[s], basis);
+                self.show(particles, frame, seen);
+            }
+        }
+    }
+
+    /// Let the velocities that the shift sees at solid particles follow. A cubic would not do: its large gradients next to a wall
+    /// that is badly resolved feed on themselves.
+    pub fn see_for_shift(&mut self, settings: &Settings, particles: &Particles<D>, frame: &Frame<D>) {
+        if self.rule == WallVelocity::Cubic {
+            self.mirror(settings, particles, frame);
+        }
+    }
+
+    /// 2 u_wall minus the Shepard average of the fluid's velocity (Adami, Hu and Adams 2012, eq. 23).
+    fn mirror(&mut self, settings: &Settings, particles: &Particles<D>, frame: &Frame<D>) {
+        let Particles { real, kind, velocity, .. } = particles;
+        let solids = (0..*real).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
+        let average = |i| shepard(settings, &frame.stencil, i, |j, _| velocity[j].into()).map(Vector::from);
+        let seen = solids.map(|i| (i, average(i).map_or(velocity[i], |average| velocity[i] * 2.0 - average))).collect();
+        self.show(particles, frame, seen);
+    }
+
+    fn show(&mut self, particles: &Particles<D>, frame: &Frame<D>, seen: Vec<(usize, Vector<D>)>) {
+        self.viscous_velocity.resize(particles.len(), Vector::zeros());
+        seen.into_iter().for_each(|(s, seen)| self.viscous_velocity[s] = seen);
+        frame.images.vectors(&mut self.viscous_velocity);
+    }
+
+    /// Set [`Walls::dispersion`] to `factor` ∇²u, `laplacian` being that of the real particles. The compact Laplacian of a wave is too
+    /// small by `factor` k²; that of u − dispersion is right to fourth order.
+    pub fn sharpen(
+        &mut self,
+        settings: &Settings,
+        particles: &Particles<D>,
+        frame: &Frame<D>,
+        laplacian: &[Vector<D>],
+        factor: f64,
+    ) {
+        let Particles { real, kind, .. } = particles;
+        let dispersion = &mut self.dispersion;
+        dispersion.resize(particles.len(), Vector::zeros());
+        parallel::for_each(&mut dispersion[..*real], |i, out| {
+            *out = if kind[i] == ParticleKind::Fluid { laplacian[i] * factor } else { Vector::zeros() };
+        });
+        let solids = continued(settings, particles, &frame.stencil, dispersion, |_| Vector::zeros(), |n| [1.0, n]);
+        solids.into_iter().for_each(|(s, value)| dispersion[s] = value);
+        frame.images.vectors(dispersion);
     }
 
     /// Velocity of solid particle `s` in the viscous term of particle `i`. To one another solids show the wall's velocity.
@@ -31,7 +95,7 @@ impl<const D: usize> Walls<D> {
         }
         match self.rule {
             WallVelocity::Paper => particles.velocity[s],
-            WallVelocity::Adami => self.viscous_velocity[s],
+            WallVelocity::Adami | WallVelocity::Cubic => self.viscous_velocity[s],
             WallVelocity::Morris => {
                 let depth = particles.depth[s];
                 let height = (particles.position[i] - particles.position[s]).dot(&particles.normal[s]) - depth;
@@ -44,7 +108,7 @@ impl<const D: usize> Walls<D> {
 
 /// Σ W field_j / Σ W over the flowing neighbours of particle `i`, of the value that `at` gives for j and r_ij. None without
 /// neighbours.
-pub fn shepard<const D: usize, const N: usize>(
+fn shepard<const D: usize, const N: usize>(
     settings: &Settings,
     stencil: &Stencil<D>,
     i: usize,

@@ -1,12 +1,12 @@
 //! The ALSPH step: equations (8) to (13) of the paper.
 
-use crate::boundary::{Walls, deep_in_inlet, extrapolate, shepard};
+use crate::boundary::{Walls, deep_in_inlet, extrapolate};
 use crate::frame::Frame;
 use crate::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, vector_laplacian};
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::scheme::projection::Projection;
-use crate::settings::{DerivativeFrame, Settings, VelocityLaplacian, WallPressure, WallVelocity};
+use crate::settings::{DerivativeFrame, Settings, VelocityLaplacian, WallPressure};
 
 /// How a step ended.
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,6 +30,8 @@ pub struct Alsph<const D: usize> {
     /// ∇·u^m and p^m side by side, because (8) and (10) read them together.
     divergence_pressure: Vec<[f64; 2]>,
     velocity_laplacian: Vec<Vector<D>>,
+    /// What makes it of fourth order, once a step: minus the Laplacian of [`Walls::dispersion`]. Empty at second order.
+    sharpening: Vec<Vector<D>>,
     /// u*.
     velocity_star: Vec<Vector<D>>,
     pressure_laplacian: Vec<f64>,
@@ -48,6 +50,8 @@ pub struct Step<'a> {
     pub penalty: f64,
     /// σ of the projection sweeps, a length squared.
     pub relaxation: f64,
+    /// The error of the compact Laplacian of a wave over its square wave number, a length squared.
+    pub dispersion: f64,
 }
 
 impl<const D: usize> Alsph<D> {
@@ -62,6 +66,7 @@ impl<const D: usize> Alsph<D> {
     ) -> Outcome {
         self.begin(particles);
         self.velocity_derivatives(step, particles, frame, walls);
+        self.sharpen_laplacian(step, particles, frame, walls);
         for iteration in 1.. {
             self.predict_velocity(step, particles, frame); // (8)
             self.update_pressure(step, particles, frame); // (10) (20)
@@ -102,7 +107,7 @@ impl<const D: usize> Alsph<D> {
 
     /// ∇·u^m and ∇²u^m, and p^m beside ∇·u^m: the first pass over a frame, so it forms the corrections too.
     fn velocity_derivatives(&mut self, step: Step, particles: &Particles<D>, frame: &mut Frame<D>, walls: &mut Walls<D>) {
-        extrapolate_wall_velocity(step.settings, particles, frame, walls);
+        walls.see(step.settings, particles, frame);
         let real = particles.real;
         let (velocity, pressure) = (&particles.velocity, &particles.pressure);
         let walls = &*walls;
@@ -124,6 +129,22 @@ impl<const D: usize> Alsph<D> {
         frame.images.scalars(&mut self.divergence_pressure);
     }
 
+    /// The error of the compact Laplacian of a wave of wave number k is `dispersion` k² of it: take it off.
+    fn sharpen_laplacian(&mut self, step: Step, particles: &Particles<D>, frame: &Frame<D>, walls: &mut Walls<D>) {
+        if step.settings.viscous_order < 4 {
+            return;
+        }
+        walls.sharpen(step.settings, particles, frame, &self.velocity_laplacian, step.dispersion);
+        let dispersion = &walls.dispersion;
+        let count = particles.real;
+        self.sharpening.resize(count, Vector::zeros());
+        frame.stencil.for_each_one(
+            LaplacianAndDivergence { velocity: dispersion, seen: |s: usize, _: usize| dispersion[s] },
+            &mut self.sharpening,
+            |_, (laplacian, _), out| *out = -laplacian,
+        );
+    }
+
     /// u* (8), and ∇²p^m for (10), which reads the same neighbours.
     fn predict_velocity(&mut self, step: Step, particles: &Particles<D>, frame: &Frame<D>) {
         let real = particles.real;
@@ -131,6 +152,7 @@ impl<const D: usize> Alsph<D> {
         let (dt, viscosity) = (step.time_step, step.settings.kinematic_viscosity);
         let paper_walls = step.settings.wall_pressure == WallPressure::Paper;
         let (initial, laplacian) = (&self.velocity_initial, &self.velocity_laplacian);
+        let sharpening = |i: usize| self.sharpening.get(i).copied().unwrap_or_else(Vector::zeros);
         frame.stencil.for_each(
             GradientAndLaplacian(&self.divergence_pressure),
             &mut self.velocity_star[..real],
@@ -145,7 +167,7 @@ impl<const D: usize> Alsph<D> {
                 *star = if still {
                     initial[i]
                 } else {
-                    initial[i] + (penalty * step.penalty + laplacian[i] * viscosity + gravity) * dt
+                    initial[i] + (penalty * step.penalty + (laplacian[i] + sharpening(i)) * viscosity + gravity) * dt
                 };
             },
         );
@@ -236,28 +258,6 @@ impl<const D: usize> Alsph<D> {
         let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
         parallel::reduce(particles.real, norms, |a, b| (larger(a.0, b.0), a.1 + b.1)).unwrap_or_default()
     }
-}
-
-/// The velocity of solid particles in the viscous term: 2 u_wall minus the Shepard average of the fluid's (Adami, Hu and
-/// Adams 2012, eq. 23). Other rules need no preparation.
-fn extrapolate_wall_velocity<const D: usize>(
-    settings: &Settings,
-    particles: &Particles<D>,
-    frame: &Frame<D>,
-    walls: &mut Walls<D>,
-) {
-    if settings.wall_velocity != WallVelocity::Adami {
-        return;
-    }
-    let Particles { real, kind, velocity, .. } = particles;
-    walls.viscous_velocity.resize(particles.len(), Vector::zeros());
-    parallel::for_each(&mut walls.viscous_velocity[..*real], |i, seen| {
-        if kind[i] == ParticleKind::Solid {
-            let average = shepard(settings, &frame.stencil, i, |j, _| velocity[j].into());
-            *seen = average.map_or(velocity[i], |average| velocity[i] * 2.0 - Vector::from(average));
-        }
-    });
-    frame.images.vectors(&mut walls.viscous_velocity);
 }
 
 fn copy<T: Copy>(from: &[T], to: &mut Vec<T>) {

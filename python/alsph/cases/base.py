@@ -70,13 +70,16 @@ class Case(Parameters):
     laplacian_correction: bool = Field(
         default=True, description="make the scalar Laplacians vanish for linear fields on any particle arrangement"
     )
+    viscous_order: Literal[2, 4] = Field(
+        default=4, description="order of the viscous term in Δx: the compact Laplacian's own, 2, or without its leading error"
+    )
     shifting: Literal["xsph", "maximum_velocity", "none"] = Field(
         default="xsph", description="particle shifting: eq. (18), with β u_max in place of the XSPH velocity, or none"
     )
     shift_coefficient: float = Field(default=0.04, ge=0, le=1, description="β of the maximum_velocity shifting [-]")
     shift_limit: float = Field(default=0.1, gt=0, le=0.5, description="largest shift in a step [Δx]")
-    wall_velocity: Literal["paper", "adami", "morris"] = Field(
-        default="adami",
+    wall_velocity: Literal["paper", "adami", "morris", "cubic"] = Field(
+        default="cubic",
         description="velocity of solid particles in the viscous term: the body's own, or extrapolated for no-slip",
     )
     wall_pressure: Literal["paper", "adami", "linear"] = Field(
@@ -161,7 +164,7 @@ class Case(Parameters):
         """Return the engine's settings (see docs/architecture.md)."""
         shared = (
             "smoothing_ratio kernel adaptive_time_step time_step_safety max_iterations projection_sweeps "
-            "penalty_constant velocity_laplacian laplacian_correction shifting shift_coefficient shift_limit "
+            "penalty_constant velocity_laplacian laplacian_correction viscous_order shifting shift_coefficient shift_limit "
             "wall_velocity wall_pressure"
         )
         return {name: getattr(self, name) for name in shared.split()} | {

@@ -1,0 +1,95 @@
+//! What solid particles show to the viscous term, and its fourth order.
+
+use alsph::boundary::Walls;
+use alsph::operators::LaplacianAndDivergence;
+use alsph::{ParticleKind, Vector};
+use approx::assert_relative_eq;
+use common::set::Set;
+use std::f64::consts::PI;
+
+mod common;
+
+const WALL_VELOCITY: f64 = 0.3;
+
+/// A cubic over a height [Δx].
+fn cubic(n: f64) -> f64 {
+    2.0 * n - 0.3 * n * n + 0.02 * n * n * n
+}
+
+/// Disordered particles in the unit box, solid where the height that `surface` gives with the normal is negative, the fluid with the
+/// cubic's velocity. Returns for solid particles less than Δx deep away from the box's sides their depth [Δx] and what they show.
+fn shown<const D: usize>(side: usize, surface: impl Fn(&Vector<D>) -> (f64, Vector<D>)) -> Vec<(f64, Vector<D>)> {
+    let spacing = 1.0 / side as f64;
+    let mut value = common::settings_value::<D>(spacing, "none");
+    value["wall_velocity"] = "cubic".into();
+    let settings = common::parse(&value);
+    let mut particles = common::particles(common::lattice::<D>(side, 0.2));
+    for i in 0..particles.real {
+        let (height, normal) = surface(&particles.position[i]);
+        let along = Vector::from_fn(|k, _| if k == 0 { 1.0 } else { -0.5 });
+        if height > 0.0 {
+            particles.velocity[i] = Vector::repeat(WALL_VELOCITY) + along * cubic(height / spacing);
+        } else {
+            (particles.kind[i], particles.normal[i], particles.depth[i]) = (ParticleKind::Solid, normal, -height);
+            particles.velocity[i] = Vector::repeat(WALL_VELOCITY);
+        }
+    }
+    let set = Set::of(particles, &settings, true);
+    let mut walls = Walls::new(&settings);
+    walls.see(&settings, &set.particles, &set.frame);
+    let margin = 2.0 * settings.support_radius();
+    let inside = |x: &Vector<D>| x.iter().all(|&x| x > margin && x < 1.0 - margin);
+    let near = |i: &usize| set.particles.kind[*i] == ParticleKind::Solid && set.particles.depth[*i] < spacing;
+    let solids = (0..set.particles.real).filter(near).filter(|&i| inside(&set.particles.position[i]));
+    let shown: Vec<_> = solids.map(|i| (set.particles.depth[i] / spacing, walls.viscous_velocity[i])).collect();
+    assert!(shown.len() > 20);
+    shown
+}
+
+/// A cubic profile goes on into the solid particles, in 2-D and 3-D, over a plane and over a cylinder. An odd mirror image would
+/// be 15 to 30 % off.
+#[test]
+fn solids_show_the_cubic_of_the_fluid_above() {
+    let plane = shown::<2>(40, |x| (x[1] - 0.5, Vector::y()));
+    let plane = plane.into_iter().map(|(depth, u)| (depth, u[0], u[1]));
+    let upright = shown::<3>(24, |x| (x[2] - 0.5, Vector::z()));
+    let upright = upright.into_iter().map(|(depth, u)| (depth, u[0], u[2]));
+    for (depth, along, across) in plane.chain(upright) {
+        assert_relative_eq!(along - WALL_VELOCITY, cubic(-depth), max_relative = 0.06);
+        assert_relative_eq!(across - WALL_VELOCITY, -0.5 * cubic(-depth), max_relative = 0.06);
+    }
+    let centre = Vector::from([0.5, 0.5]);
+    for (depth, u) in shown::<2>(60, |x| ((x - centre).norm() - 0.2, (x - centre).normalize())) {
+        assert_relative_eq!(u[0] - WALL_VELOCITY, cubic(-depth), max_relative = 0.08);
+    }
+}
+
+/// Relative error of the viscous term of a wave `length` Δx long.
+fn error_of_wave(length: usize, fourth_order: bool) -> f64 {
+    let settings = common::settings::<2>(1.0 / length as f64, "periodic");
+    let set = Set::<2>::of(common::particles(common::lattice::<2>(length, 0.0)), &settings, true);
+    let velocity = set.field(|x| Vector::from([(2.0 * PI * x[1]).sin(), 0.0]));
+    let laplacian_of = |velocity: &[Vector<2>]| -> Vec<_> {
+        let seen = |s: usize, _: usize| velocity[s];
+        set.apply(LaplacianAndDivergence { velocity, seen }).into_iter().map(|(laplacian, _)| laplacian).collect()
+    };
+    let mut laplacian = laplacian_of(&velocity);
+    if fourth_order {
+        let factor = settings.laplacian_dispersion() * settings.particle_spacing.powi(2);
+        let mut walls = Walls::new(&settings);
+        walls.sharpen(&settings, &set.particles, &set.frame, &laplacian, factor);
+        let correction = laplacian_of(&walls.dispersion);
+        laplacian.iter_mut().zip(correction).for_each(|(laplacian, correction)| *laplacian -= correction);
+    }
+    let exact = |i: usize| -4.0 * PI * PI * velocity[i][0];
+    let error = |i: usize| (laplacian[i][0] - exact(i)).abs() / (4.0 * PI * PI);
+    (0..set.particles.real).map(error).fold(0.0, f64::max)
+}
+
+#[test]
+fn the_viscous_term_is_of_second_or_fourth_order() {
+    let order = |fourth| (error_of_wave(12, fourth) / error_of_wave(24, fourth)).log2();
+    assert_relative_eq!(order(false), 2.0, epsilon = 0.1);
+    assert!(order(true) > 3.5, "{}", order(true));
+    assert!(error_of_wave(12, true) < 0.2 * error_of_wave(12, false));
+}
