@@ -60,10 +60,10 @@ impl<const D: usize> Wall<'_, D> {
         Self: 'b,
     {
         let (stencil, settings) = (self.stencil, self.settings);
-        let weight = move |r: f64| {
-            with_kernel!(settings.kernel, K => Smoothing::<K>::new(settings.smoothing_length(), D).value(r))
-        };
-        near.map(move |j| (j, weight((stencil.position[s] - stencil.position[j]).norm()))).filter(|(_, weight)| *weight > 0.0)
+        let weight =
+            move |r: f64| with_kernel!(settings.kernel, K => Smoothing::<K>::new(settings.smoothing_length(), D).value(r));
+        near.map(move |j| (j, weight((stencil.position[s] - stencil.position[j]).norm())))
+            .filter(|(_, weight)| *weight > 0.0)
     }
 
     /// Coefficients of the basis at surface particle `s`. None without fluid above.

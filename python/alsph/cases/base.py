@@ -71,7 +71,8 @@ class Case(Parameters):
         default=True, description="make the scalar Laplacians vanish for linear fields on any particle arrangement"
     )
     viscous_order: Literal[2, 4] = Field(
-        default=4, description="order of the viscous term in Δx: the compact Laplacian's own, 2, or without its leading error"
+        default=4,
+        description="order of the viscous term in Δx: the compact Laplacian's own, 2, or without its leading error",
     )
     shifting: Literal["xsph", "maximum_velocity", "none"] = Field(
         default="xsph", description="particle shifting: eq. (18), with β u_max in place of the XSPH velocity, or none"
@@ -164,8 +165,8 @@ class Case(Parameters):
         """Return the engine's settings (see docs/architecture.md)."""
         shared = (
             "smoothing_ratio kernel adaptive_time_step time_step_safety max_iterations projection_sweeps "
-            "penalty_constant velocity_laplacian laplacian_correction viscous_order shifting shift_coefficient shift_limit "
-            "wall_velocity wall_pressure"
+            "penalty_constant velocity_laplacian laplacian_correction viscous_order shifting shift_coefficient "
+            "shift_limit wall_velocity wall_pressure"
         )
         return {name: getattr(self, name) for name in shared.split()} | {
             "dimensions": self.space_dimensions,
