@@ -1,0 +1,201 @@
+"""Compare the whole flow past the cylinder, not only its forces, with finite elements from a common start.
+
+`solve` computes the flow at Re = 200 in the paper's channel with NGSolve (velocity of order 4, pressure of order 3,
+curved elements, second-order time stepping with an explicit convective term), started as the case is; it needs an
+environment of its own. `compare` starts alsph with that field at t* = 2, when the boundary layers are there and the
+pressure waves of the impulsive start are not, and prints at every half time unit forces, those of the reference in
+brackets, and errors of the velocity within 2 D of the centre.
+
+    python -m venv fem && fem/bin/pip install ngsolve
+    fem/bin/python benches/reference/cylinder.py solve --until 6 --resolutions 20 30 -o fields.npz
+    python benches/reference/cylinder.py compare fields.npz --resolution 20 [--set wall_velocity=adami viscous_order=2]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+
+REYNOLDS, LENGTH, HEIGHT, UPSTREAM, RADIUS, PERTURBATION = 200.0, 14.0, 13.0, 4.0, 0.5, 0.1
+START, EVERY = 2.0, 0.5
+SPACING, REACH = 0.05, 2.0  # of the points of comparison: spacing, distance from the centre
+
+
+def cell_centres(resolution: int) -> np.ndarray:
+    """Cell centres (n, 2) of the channel, those of alsph's lattice."""
+    x, y = (np.arange(round(size * resolution)) + 0.5 for size in (LENGTH, HEIGHT))
+    return np.stack(np.meshgrid(x / resolution, y / resolution - HEIGHT / 2, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def comparison_points() -> np.ndarray:
+    """Points (n, 2) around the cylinder, none nearer to it than 0.05 D."""
+    line = np.arange(-REACH, REACH + SPACING / 2, SPACING)
+    points = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
+    distance = np.hypot(*points.T)
+    return points[(distance > RADIUS + 0.05) & (distance < REACH)] + (UPSTREAM, 0)
+
+
+def solve(until: float, resolutions: list[int], output: Path, step: float = 0.002) -> None:
+    """Write the forces, the velocity at the points of comparison, and at t* = 2 the fields at the cell centres."""
+    import ngsolve as ng
+    from netgen.occ import Circle, Glue, MoveTo, OCCGeometry
+
+    channel = MoveTo(0, -HEIGHT / 2).Rectangle(LENGTH, HEIGHT).Face()
+    for edge in channel.edges:
+        at = edge.center.x
+        edge.name = "inlet" if abs(at) < 1e-6 else "outlet" if abs(at - LENGTH) < 1e-6 else "side"
+    wake = MoveTo(UPSTREAM - 1, -1.5).Rectangle(LENGTH - UPSTREAM + 1, 3).Face()
+    near, disc = (Circle((UPSTREAM, 0), radius).Face() for radius in (1.0, RADIUS))
+    wake.faces.maxh, near.faces.maxh = 0.22, 0.13
+    disc.edges.name, disc.edges.maxh = "cylinder", 0.08
+    parts = Glue([channel - wake - near - disc, wake - near - disc, near - disc])
+    mesh = ng.Mesh(OCCGeometry(parts, dim=2).GenerateMesh(maxh=0.8, grading=0.3)).Curve(5)
+
+    velocity = ng.VectorH1(mesh, order=4, dirichletx="inlet|cylinder", dirichlety="inlet|side|cylinder")
+    space = velocity * ng.H1(mesh, order=3)
+    (u, p), (v, q) = space.TnT()
+    viscous = ng.InnerProduct(ng.Grad(u) + ng.Grad(u).trans, ng.Grad(v)) / REYNOLDS
+
+    def implicit(factor: float):
+        form = ng.BilinearForm(space, symmetric=True)
+        form += (viscous - ng.div(u) * q - ng.div(v) * p + factor / step * u * v) * ng.dx
+        form.Assemble()
+        return form.mat, form.mat.Inverse(space.FreeDofs(), inverse="sparsecholesky")
+
+    mass = ng.BilinearForm(space)
+    mass += u * v * ng.dx
+    mass.Assemble()
+    flow, inflow = ng.GridFunction(space), ng.GridFunction(space)
+    uh, ph = flow.components
+    x, y = (ng.x - UPSTREAM) / 0.6, ng.y / 0.6
+    swirl = PERTURBATION * ng.exp(0.5 * (1 - x * x - y * y))
+    uh.Set(ng.CoefficientFunction((1 - swirl * y, swirl * x)))
+    inflow.components[0].Set(ng.CoefficientFunction((1, 0)), definedon=mesh.Boundaries("inlet"))
+    convection = ng.LinearForm(space)
+    convection += ng.InnerProduct(ng.Grad(uh) * uh, v) * ng.dx
+    into_body = ng.CoefficientFunction(((UPSTREAM - ng.x) / RADIUS, -ng.y / RADIUS))
+    stress = ng.BoundaryFromVolumeCF((ng.Grad(uh) + ng.Grad(uh).trans) / REYNOLDS)
+
+    def forces() -> list[float]:
+        traction = stress * into_body
+        parts = ng.CoefficientFunction((ph * into_body[0], -traction[0], ph * into_body[1] - traction[1]))
+        values = ng.Integrate(parts, mesh, ng.BND, definedon=mesh.Boundaries("cylinder"), order=12)
+        return [2 * value for value in values]
+
+    def at(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        found = mesh(np.clip(points[:, 0], 1e-6, LENGTH - 1e-6), points[:, 1])
+        return np.array(uh(found)), np.array(ph(found)).ravel()
+
+    saved: dict[str, np.ndarray] = {}
+    history, snapshots = [], []
+    (first, first_inverse), (later, later_inverse) = implicit(1.0), implicit(1.5)
+    before, before_that, old_convection = flow.vec.Copy(), None, None
+    for n in range(1, round(until / step) + 1):
+        convection.Assemble()
+        right = flow.vec.CreateVector()
+        if before_that is None:
+            right.data = 1 / step * (mass.mat * before) - convection.vec
+            matrix, inverse = first, first_inverse
+        else:
+            right.data = 1 / step * (mass.mat * (2 * before - 0.5 * before_that))
+            right.data += old_convection - 2 * convection.vec
+            matrix, inverse = later, later_inverse
+        old_convection, before_that = convection.vec.Copy(), before
+        right.data -= matrix * inflow.vec
+        flow.vec.data = inflow.vec + inverse * right
+        before = flow.vec.Copy()
+        time = n * step
+        if n % 10 == 0:
+            history.append([time, *forces()])
+        if n % round(EVERY / step) == 0:
+            snapshots.append((time, at(comparison_points())[0]))
+            print(
+                f"t* = {time:.1f}: C_D = {history[-1][1]:.4f} + {history[-1][2]:.4f}, C_L = {history[-1][3]:+.4f}",
+                flush=True,
+            )
+        if n == round(START / step):
+            for resolution in resolutions:
+                points = cell_centres(resolution)
+                outside = np.hypot(*(points - (UPSTREAM, 0)).T) >= RADIUS
+                # Chords of the curved mesh leave a sliver of the fluid outside of it.
+                offset = points[outside] - (UPSTREAM, 0)
+                radius = np.hypot(*offset.T)[:, None]
+                values = at(offset * np.maximum(radius, RADIUS + 2e-3) / radius + (UPSTREAM, 0))
+                fields = np.full((len(points), 3), np.nan)
+                fields[outside] = np.column_stack(values)
+                saved[f"start_{resolution}"] = fields
+    times, fields = zip(*snapshots, strict=True)
+    np.savez_compressed(output, history=history, times=times, velocity=fields, **saved)
+
+
+def compare(path: Path, resolution: int, until: float, settings: dict[str, object]) -> None:
+    """Print forces and velocity errors of alsph against the fields in `path`."""
+    from alsph.cases import Cylinder
+    from alsph.geometry import Kind
+    from alsph.sampling import interpolate
+
+    fields = np.load(path)
+    start = fields[f"start_{resolution}"].reshape(round(LENGTH * resolution), round(HEIGHT * resolution), 3)
+
+    class Started(Cylinder):
+        """The cylinder with the reference's velocity and pressure."""
+
+        def particles(self) -> dict[str, np.ndarray]:
+            arrays = super().particles()
+            fluid = arrays["kind"] == Kind.FLUID
+            cell = np.floor((arrays["position"][fluid] + (0, HEIGHT / 2)) * resolution).astype(int)
+            arrays["velocity"][fluid], arrays["pressure"][fluid] = start[*cell.T, :2], start[*cell.T, 2]
+            return arrays
+
+    simulation = Started(resolution=resolution, reynolds=REYNOLDS, **settings).simulation()
+    points = comparison_points()
+    times, known = fields["times"], fields["history"]
+    print("t*     C_D pressure         C_D viscous          C_L                  rms error of u, v [U]")
+    for time, expected in zip(times[times > START], fields["velocity"][times > START], strict=True):
+        if time > until:
+            break
+        simulation.run_until(time - START)
+        state, history = simulation.snapshot(), simulation.history()
+        fluid = state["kind"] == Kind.FLUID
+        found, _ = interpolate(state["position"][fluid], state["velocity"][fluid], points, 1 / resolution)
+        error = np.sqrt(((found - expected) ** 2).mean(axis=0))
+        row = f"{time:3.1f}"
+        names = ("drag_pressure", "drag_viscous", "lift_coefficient")
+        for column, name in enumerate(names, start=1):
+            ours = history[name][history["time"] > time - START - EVERY / 2].mean()
+            theirs = known[(known[:, 0] > time - EVERY / 2) & (known[:, 0] <= time), column].mean()
+            row += f"   {ours:+.4f} ({theirs:+.4f})"
+        print(row, "  {:.4f} {:.4f}".format(*error), flush=True)
+
+
+def main() -> None:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(dest="command", required=True)
+    solving = commands.add_parser("solve", help="compute the reference with NGSolve")
+    solving.add_argument("--until", type=float, default=6.0, help="end time [D/U] (%(default)s)")
+    solving.add_argument("--resolutions", type=int, nargs="+", default=[20], help="D/Δx to give start fields for (20)")
+    solving.add_argument("-o", "--output", type=Path, default=Path("fields.npz"), help="file to write (%(default)s)")
+    comparing = commands.add_parser("compare", help="run alsph from the reference's field at t* = 2")
+    comparing.add_argument("fields", type=Path, help="the file that `solve` wrote")
+    comparing.add_argument("--resolution", type=int, default=20, help="D/Δx, one of those solved for (%(default)s)")
+    comparing.add_argument("--until", type=float, default=4.0, help="end time [D/U] (%(default)s)")
+    comparing.add_argument("--set", nargs="*", default=[], metavar="NAME=VALUE", help="parameters of the case")
+    options = parser.parse_args()
+    if options.command == "solve":
+        solve(options.until, options.resolutions, options.output)
+        return
+    settings = {}
+    for name, value in (item.split("=", 1) for item in options.set):
+        try:
+            settings[name] = json.loads(value)
+        except ValueError:
+            settings[name] = value
+    compare(options.fields, options.resolution, options.until, settings)
+
+
+if __name__ == "__main__":
+    main()
