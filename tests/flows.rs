@@ -186,11 +186,14 @@ fn bits(particles: &Particles<2>) -> Vec<u64> {
 #[test]
 fn threads_change_no_bit() {
     for algorithm in ALGORITHMS {
-        for (wall_velocity, wall_pressure) in [("adami", "paper"), ("morris", "linear"), ("paper", "adami")] {
+        for (wall_velocity, wall_pressure) in
+            [("adami", "paper"), ("cubic", "linear"), ("morris", "linear"), ("paper", "adami")]
+        {
             let run = |threads| {
                 let (mut value, particles) = channel(24, true);
                 value["wall_velocity"] = wall_velocity.into();
                 value["wall_pressure"] = wall_pressure.into();
+                value["viscous_order"] = if wall_velocity == "cubic" { 4 } else { 2 }.into();
                 let settings = with_algorithm(value, algorithm);
                 let mut simulation = Simulation::new(settings, particles, Clock::default(), Some(threads)).expect("valid");
                 simulation.advance(40, None).expect("stable");
