@@ -204,8 +204,8 @@ fn bytes_per_particle(settings: &str) -> PyResult<f64> {
     let ratio = settings.support_radius() / settings.particle_spacing;
     // Neighbours of four particles: a sphere widened by the distance between them.
     let (neighbours, fields) = match settings.dimensions {
-        2 => (std::f64::consts::PI * (ratio + 0.9).powi(2), 16 * size_of::<Vector<2>>()),
-        _ => (4.0 / 3.0 * std::f64::consts::PI * (ratio + 0.9).powi(3), 16 * size_of::<Vector<3>>()),
+        2 => (std::f64::consts::PI * (ratio + 0.9).powi(2), 18 * size_of::<Vector<2>>()),
+        _ => (4.0 / 3.0 * std::f64::consts::PI * (ratio + 0.9).powi(3), 18 * size_of::<Vector<3>>()),
     };
     // The rows grow by doubling, so half of their room may be empty.
     Ok(1.5 * neighbours * (size_of::<Entry>() / LANES) as f64 + fields as f64 + 100.0)

@@ -264,6 +264,9 @@ impl Settings {
         if !(2..=3).contains(&self.dimensions) {
             return Err(setting("dimensions", format!("must be 2 or 3, not {}", self.dimensions)));
         }
+        if ![2, 4].contains(&self.viscous_order) {
+            return Err(setting("viscous_order", format!("must be 2 or 4, not {}", self.viscous_order)));
+        }
         let positive = [
             ("particle_spacing", self.particle_spacing),
             ("smoothing_ratio", self.smoothing_ratio),

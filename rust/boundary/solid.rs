@@ -67,7 +67,7 @@ impl<const D: usize> Walls<D> {
     }
 
     /// Set [`Walls::dispersion`] to `factor` ∇²u, `laplacian` being that of the real particles. The compact Laplacian of a wave is too
-    /// small by `factor` k²; that of u − dispersion is right to fourth order.
+    /// small by `factor` k² of it; that of u − dispersion is right to fourth order.
     pub fn sharpen(
         &mut self,
         settings: &Settings,
