@@ -90,7 +90,7 @@ def solve(until: float, resolutions: list[int], output: Path, step: float = 0.00
         return np.array(uh(found)), np.array(ph(found)).ravel()
 
     saved: dict[str, np.ndarray] = {}
-    history, snapshots = [], []
+    history, snapshots, points_compared = [], [], comparison_points()
     (first, first_inverse), (later, later_inverse) = implicit(1.0), implicit(1.5)
     before, before_that, old_convection = flow.vec.Copy(), None, None
     for n in range(1, round(until / step) + 1):
@@ -111,7 +111,7 @@ def solve(until: float, resolutions: list[int], output: Path, step: float = 0.00
         if n % 10 == 0:
             history.append([time, *forces()])
         if n % round(EVERY / step) == 0:
-            snapshots.append((time, at(comparison_points())[0]))
+            snapshots.append((time, at(points_compared)[0]))
             print(
                 f"t* = {time:.1f}: C_D = {history[-1][1]:.4f} + {history[-1][2]:.4f}, C_L = {history[-1][3]:+.4f}",
                 flush=True,

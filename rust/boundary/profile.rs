@@ -4,11 +4,11 @@
 //! solid particles below take its values at their depths. So the compact Laplacian sees a field that is smooth across the surface; an
 //! odd mirror image, which Shepard averages amount to, turns the sign of the curvature there and halves it in the first layer.
 
-use crate::kernel::Smoothing;
+use crate::boundary::solid::for_each_weighted;
+use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::Settings;
 use crate::stencil::Stencil;
-use crate::with_kernel;
 use nalgebra::SMatrix;
 use rayon::prelude::*;
 
@@ -33,7 +33,7 @@ pub fn continued<const D: usize, const K: usize>(
     basis: impl Fn(f64) -> [f64; K] + Sync,
 ) -> Vec<(usize, Vector<D>)> {
     let wall = Wall { settings, particles, stencil };
-    let solids: Vec<usize> = (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Solid).collect();
+    let solids = parallel::filter(particles.real, |i| particles.kind[i] == ParticleKind::Solid);
     let surface = solids.par_iter().filter(|&&s| wall.is_surface(s));
     let fits: Vec<_> = surface.filter_map(|&s| Some((s, wall.fit(s, field, base(s), &basis)?))).collect();
     solids.par_iter().map(|&s| (s, base(s) + wall.evaluate(s, &fits, &basis))).collect()
@@ -54,18 +54,6 @@ impl<const D: usize> Wall<'_, D> {
         self.particles.normal[a].dot(&self.particles.normal[b]) > SAME_WALL
     }
 
-    /// Kernel weights of the neighbours `near` of particle `s`, without those of others in its cluster.
-    fn weights<'b>(&self, s: usize, near: impl Iterator<Item = usize> + 'b) -> impl Iterator<Item = (usize, f64)> + 'b
-    where
-        Self: 'b,
-    {
-        let (stencil, settings) = (self.stencil, self.settings);
-        let weight =
-            move |r: f64| with_kernel!(settings.kernel, K => Smoothing::<K>::new(settings.smoothing_length(), D).value(r));
-        near.map(move |j| (j, weight((stencil.position[s] - stencil.position[j]).norm())))
-            .filter(|(_, weight)| *weight > 0.0)
-    }
-
     /// Coefficients of the basis at surface particle `s`. None without fluid above.
     fn fit<const K: usize>(
         &self,
@@ -79,14 +67,14 @@ impl<const D: usize> Wall<'_, D> {
         let feet: Vec<usize> = feet.collect();
         let mut moments = SMatrix::<f64, K, K>::zeros();
         let mut sums = SMatrix::<f64, K, D>::zeros();
-        for (j, weight) in self.weights(s, row.flowing().iter().map(|entry| entry.j())) {
+        for_each_weighted(self.settings, self.stencil, s, row.flowing(), |j, weight, _| {
             let height = self.height(j, &feet) / self.settings.particle_spacing;
             if height > 0.0 {
                 let basis = SMatrix::<f64, K, 1>::from(basis(height));
                 moments += basis * basis.transpose() * weight;
                 sums += basis * (field[j] - base).transpose() * weight;
             }
-        }
+        });
         let scale = moments[(0, 0)];
         (1..K).for_each(|k| moments[(k, k)] += RIDGE * scale);
         let coefficients = moments.cholesky()?.solve(&sums);
@@ -114,15 +102,15 @@ impl<const D: usize> Wall<'_, D> {
         if let Some(own) = fit_of(s) {
             return at(own);
         }
-        let near = self.stencil.neighbours.row(s).0.solid().iter().map(|entry| entry.j());
+        let near = self.stencil.neighbours.row(s).0.solid();
         let mut total = 0.0;
         let mut sum = Vector::zeros();
-        for (a, weight) in self.weights(s, near.filter(|&a| self.same_wall(a, s))) {
-            if let Some(fit) = fit_of(a) {
+        for_each_weighted(self.settings, self.stencil, s, near, |a, weight, _| {
+            if let Some(fit) = fit_of(a).filter(|_| self.same_wall(a, s)) {
                 total += weight;
                 sum += at(fit) * weight;
             }
-        }
+        });
         if total > 0.0 { sum / total } else { sum }
     }
 }

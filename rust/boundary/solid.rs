@@ -2,7 +2,8 @@
 
 use crate::boundary::profile::continued;
 use crate::frame::Frame;
-use crate::kernel::{Kernel, Smoothing};
+use crate::kernel::Smoothing;
+use crate::neighbours::Entry;
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{Settings, WallVelocity};
@@ -114,7 +115,16 @@ fn shepard<const D: usize, const N: usize>(
     i: usize,
     at: impl Fn(usize, Vector<D>) -> [f64; N],
 ) -> Option<[f64; N]> {
-    with_kernel!(settings.kernel, K => average(Smoothing::<K>::new(settings.smoothing_length(), D), stencil, i, at))
+    let mut total = 0.0;
+    let mut sum = [0.0; N];
+    for_each_weighted(settings, stencil, i, stencil.neighbours.row(i).0.flowing(), |j, weight, r_ij| {
+        let value = at(j, r_ij);
+        total += weight;
+        for k in 0..N {
+            sum[k] += weight * value[k];
+        }
+    });
+    (total > 0.0).then(|| sum.map(|s| s / total))
 }
 
 /// Give each solid particle of `field` the Shepard average of what `at(field, j, r_ij)` says of the flowing neighbours; zero
@@ -133,25 +143,23 @@ pub fn extrapolate<const D: usize>(
     extrapolated.into_iter().for_each(|(i, value)| field[i] = value);
 }
 
-fn average<K: Kernel, const D: usize, const N: usize>(
-    kernel: Smoothing<K>,
+/// `f(j, W_ij, r_ij)` for those of the neighbours `near` of particle `i` that are in its support. Others of its cluster's may be
+/// there too, and what they carry may be stale.
+pub fn for_each_weighted<const D: usize>(
+    settings: &Settings,
     stencil: &Stencil<D>,
     i: usize,
-    at: impl Fn(usize, Vector<D>) -> [f64; N],
-) -> Option<[f64; N]> {
-    let mut total = 0.0;
-    let mut sum = [0.0; N];
-    for entry in stencil.neighbours.row(i).0.flowing() {
-        let r_ij = stencil.position[i] - stencil.position[entry.j()];
-        let weight = kernel.value(r_ij.norm());
-        if weight == 0.0 {
-            continue; // in the support of another of the cluster, where the value may be stale
+    near: &[Entry],
+    mut f: impl FnMut(usize, f64, Vector<D>),
+) {
+    with_kernel!(settings.kernel, K => {
+        let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
+        for entry in near {
+            let r_ij = stencil.position[i] - stencil.position[entry.j()];
+            let weight = kernel.value(r_ij.norm());
+            if weight != 0.0 {
+                f(entry.j(), weight, r_ij);
+            }
         }
-        let value = at(entry.j(), r_ij);
-        total += weight;
-        for k in 0..N {
-            sum[k] += weight * value[k];
-        }
-    }
-    (total > 0.0).then(|| sum.map(|s| s / total))
+    });
 }
