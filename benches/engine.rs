@@ -1,13 +1,14 @@
-//! Cost of each stage on perturbed periodic lattices, per directed pair (stages) and per particle (whole step).
+//! Cost of each stage on perturbed periodic lattices, per directed pair (stages) and per particle and pass (whole step).
 //!
-//! `cargo bench` prints the throughput in elements a second: pairs for search, stencil and operators, particles for a step.
+//! `cargo bench` prints the throughput in elements a second: pairs for search, stencil and operators, particles times passes for a step.
 
+use alsph::breakdown;
 use alsph::frame::{Frame, Travel};
 use alsph::lanes::LANES;
-use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, VelocityGradient};
+use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, VelocityGradient};
 use alsph::{Clock, Matrix, Simulation, Vector};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use lattice::{particles, settings};
+use lattice::{METHODS, particles, settings};
 use std::hint::black_box;
 
 mod lattice;
@@ -17,7 +18,7 @@ const SIDES: [usize; 2] = [141, 447];
 
 fn stages(criterion: &mut Criterion) {
     for side in SIDES {
-        let settings = settings::<2>(side, "initial");
+        let settings = settings::<2>(side, METHODS[0]);
         let mut particles = particles::<2>(side);
         let mut frame = Frame::default();
         frame.search(&settings, &mut particles, Travel::default(), true);
@@ -64,8 +65,10 @@ fn stages(criterion: &mut Criterion) {
         });
         group.bench_function(BenchmarkId::new("laplacian and divergence", count), |b| {
             b.iter(|| {
-                let operator = LaplacianAndDivergence { velocity, seen: |s: usize, _: usize| velocity[s] };
-                stencil.for_each(operator, &mut vectors, &mut scalars, |_, value, l, d| (*l, *d) = value);
+                let operator = LaplacianAndGradient { velocity, seen: |s: usize, _: usize| velocity[s] };
+                stencil.for_each(operator, &mut vectors, &mut scalars, |_, (laplacian, gradient), l, d| {
+                    (*l, *d) = (laplacian, gradient.trace())
+                });
                 black_box((&vectors, &scalars));
             });
         });
@@ -74,6 +77,9 @@ fn stages(criterion: &mut Criterion) {
                 stencil.for_each(GradientAndLaplacian(&both), &mut vectors, &mut scalars, |_, value, g, l| (*g, *l) = value);
                 black_box((&vectors, &scalars));
             });
+        });
+        group.bench_function(BenchmarkId::new("breakdown", count), |b| {
+            b.iter(|| black_box(breakdown::find(&settings, &particles, &stencil.volume, settings.time_step)));
         });
         group.bench_function(BenchmarkId::new("velocity gradient", count), |b| {
             b.iter(|| {
@@ -86,16 +92,16 @@ fn stages(criterion: &mut Criterion) {
 }
 
 fn step(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("step of 5 iterations");
+    let mut group = criterion.benchmark_group("step");
     group.sample_size(10);
     for side in SIDES {
-        for (algorithm, frame) in [(1, "updated"), (2, "initial")] {
+        for method in METHODS {
             for threads in [1, 2] {
                 let mut simulation =
-                    Simulation::new(settings::<2>(side, frame), particles::<2>(side), Clock::default(), Some(threads))
+                    Simulation::new(settings::<2>(side, method), particles::<2>(side), Clock::default(), Some(threads))
                         .expect("the particles of the bench are valid");
-                group.throughput(Throughput::Elements((side * side) as u64));
-                let name = format!("algorithm {algorithm}, {threads} threads");
+                group.throughput(Throughput::Elements((side * side) as u64 * method.passes as u64));
+                let name = format!("{}, {threads} threads", method.name);
                 group.bench_function(BenchmarkId::new(name, side * side), |b| b.iter(|| simulation.advance(1, None)));
             }
         }

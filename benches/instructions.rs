@@ -7,6 +7,7 @@ use alsph::{Clock, Simulation};
 use std::process::Command;
 
 mod lattice;
+use lattice::{METHODS, Method};
 
 /// Particles a side, in 2-D and 3-D.
 const SIDES: [usize; 2] = [48, 10];
@@ -14,20 +15,11 @@ const SIDES: [usize; 2] = [48, 10];
 /// Pairs a particle.
 const NEIGHBOURS: [f64; 2] = [48.1, 267.0];
 
-/// Name, derivative frame, iterations, projection sweeps and passes of a step.
-type Method = (&'static str, &'static str, usize, usize, f64);
-const METHODS: [Method; 3] = [
-    ("Algorithm 2", "initial", 5, 0, 24.0),
-    ("Algorithm 1", "updated", 5, 0, 29.0),
-    ("two iterations and four sweeps", "initial", 2, 4, 20.0),
-];
-
 /// Counts differ by these steps, so that the start cancels.
 const STEPS: [u64; 2] = [1, 3];
 
-fn steps<const D: usize>(side: usize, (_, frame, iterations, sweeps, _): Method, steps: u64) {
-    let mut settings = lattice::settings::<D>(side, frame);
-    (settings.max_iterations, settings.projection_sweeps) = (iterations, sweeps);
+fn steps<const D: usize>(side: usize, method: Method, steps: u64) {
+    let settings = lattice::settings::<D>(side, method);
     let simulation = Simulation::new(settings, lattice::particles::<D>(side), Clock::default(), Some(1));
     simulation.and_then(|mut simulation| simulation.advance(steps, None)).expect("the vortex is stable");
 }
@@ -57,7 +49,7 @@ fn main() {
         };
     }
     for dimensions in [2, 3] {
-        for (k, (name, .., passes)) in METHODS.into_iter().enumerate() {
+        for (k, Method { name, passes, .. }) in METHODS.into_iter().enumerate() {
             let [few, many] = STEPS.map(|steps| count([dimensions, k, steps as usize]));
             let (Some(few), Some(many)) = (few, many) else {
                 println!("valgrind is needed, and did not run");

@@ -1,4 +1,4 @@
-//! Time and memory a particle from 2e4 to 5e6 particles, in 2-D and 3-D: both should stay flat.
+//! Time and memory a particle from 2e4 to 5e6 particles, in 2-D and 3-D, with the default method: both should stay flat.
 //!
 //! `cargo bench --bench scaling` runs every size in a process of its own; `cargo bench --bench scaling -- 3 100 2` one size, as
 //! dimensions, particles a side and threads.
@@ -8,6 +8,7 @@ use std::process::Command;
 use std::time::Instant;
 
 mod lattice;
+use lattice::METHODS;
 
 /// Dimensions and particles a side.
 const SIZES: [(usize, usize); 8] = [(2, 141), (2, 447), (2, 1000), (2, 2236), (3, 27), (3, 59), (3, 100), (3, 171)];
@@ -23,7 +24,7 @@ fn peak_memory() -> f64 {
 }
 
 fn one<const D: usize>(side: usize, threads: usize) {
-    let settings = lattice::settings::<D>(side, "initial");
+    let settings = lattice::settings::<D>(side, METHODS[2]);
     let particles = lattice::particles::<D>(side);
     let count = particles.real as f64;
     let mut simulation =

@@ -14,10 +14,9 @@ pub enum Error {
 
     /// A field lost its meaning. The simulation still holds the state before the failing step.
     #[error(
-        "the solution diverged at step {step}, time {time:.6}: {field} of particle {particle} at {position:?} is {value}; \
-         take a smaller time step or a smaller penalty constant"
+        "the solution diverged at step {step}, time {time:.6}: {field} of particle {particle} at {position:?} is {value}; {cause}"
     )]
-    Diverged { step: u64, time: f64, particle: u64, position: Vec<f64>, field: &'static str, value: f64 },
+    Diverged { step: u64, time: f64, particle: u64, position: Vec<f64>, field: &'static str, value: f64, cause: String },
 }
 
 pub type Result<T> = std::result::Result<T, Error>;

@@ -13,6 +13,8 @@ use rayon::prelude::*;
 pub struct Travel {
     pub time_step: f64,
     pub velocity_max: f64,
+    /// How far of u^n Δt the particles go before the search: ½ for the frame in the middle of the step.
+    pub fraction: f64,
 }
 
 /// Part of u_max Δt by which two particles may approach each other beyond what their velocities at r^n make them, before the
@@ -26,6 +28,8 @@ pub struct Frame<const D: usize> {
     pub stencil: Stencil<D>,
     /// Where the particles are expected while the list is in use: r^n + u^n Δt. Empty if the list is for r^n only.
     expected: Vec<Vector<D>>,
+    /// r^n of the real particles, if the frame is not there.
+    pub start: Vec<Vector<D>>,
     /// How much two particles may approach each other from there.
     skin: f64,
     /// Distance within which the grid finds particles.
@@ -38,7 +42,8 @@ impl<const D: usize> Frame<D> {
     pub fn search(&mut self, settings: &Settings, particles: &mut Particles<D>, travel: Travel, reorder: bool) {
         let follows = settings.derivative_frame == DerivativeFrame::Updated;
         let lasts = follows && !settings.search_every_iteration;
-        let distance = if follows { (travel.velocity_max * travel.time_step).min(settings.particle_spacing) } else { 0.0 };
+        let moves = follows || travel.fraction > 0.0;
+        let distance = if moves { (travel.velocity_max * travel.time_step).min(settings.particle_spacing) } else { 0.0 };
         self.skin = if lasts { SKIN * distance } else { 0.0 };
         self.reach = search_radius(settings) + self.skin + if lasts { 2.0 * distance } else { 0.0 };
         particles.drop_images();
@@ -48,6 +53,18 @@ impl<const D: usize> Frame<D> {
         }
         // Images that come within reach during the step, too.
         self.images.create(particles, &settings.domain, search_radius(settings) + 3.0 * distance);
+        self.start.clear();
+        if travel.fraction > 0.0 {
+            self.start.extend_from_slice(&particles.position[..particles.real]);
+            let mut position = std::mem::take(&mut particles.position);
+            parallel::for_each(&mut position[..particles.real], |i, r| {
+                if !particles.is_fixed(i, &settings.bodies) {
+                    *r += particles.velocity[i] * (travel.fraction * travel.time_step);
+                }
+            });
+            self.images.positions(&mut position);
+            particles.position = position;
+        }
         self.expected.clear();
         if lasts {
             self.expected.extend_from_slice(&particles.position);

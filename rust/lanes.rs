@@ -1,10 +1,12 @@
 //! Four numbers side by side, one for each particle of a cluster: what the loops over pairs compute with.
 //!
-//! [`run`] picks the vector instructions at run time, so that one build is fast on every machine. All versions round alike
+//! [`run`] picks the vector instructions at run time ([`Instructions`]), so that one build is fast on every machine. All versions round alike
 //! (the same operations are fused, none is reordered), so the results are the same to the last bit.
 
+use crate::error::{Result, setting};
 use crate::particles::{Matrix, Vector};
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
+use std::sync::OnceLock;
 
 /// Particles a cluster.
 pub const LANES: usize = 4;
@@ -52,15 +54,61 @@ pub trait Task {
     fn run<V: Lanes>(self);
 }
 
-/// Run `task` with the vector instructions that this machine has.
-pub fn run(task: impl Task) {
+/// The vector instructions that [`run`] may use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Instructions {
+    /// Those that every machine of the architecture has.
+    Portable,
+    /// AVX2 with FMA, BMI1 and BMI2.
+    Avx2,
+}
+
+/// Environment variable that pins the instructions: ``portable`` or ``avx2``.
+pub const PIN: &str = "ALSPH_INSTRUCTIONS";
+
+impl Instructions {
+    /// Those that are used from the first call on: what [`PIN`] says, or else the best that this machine has.
+    pub fn chosen() -> Result<Self> {
+        static CHOSEN: OnceLock<std::result::Result<Instructions, String>> = OnceLock::new();
+        CHOSEN
+            .get_or_init(|| Self::choose(std::env::var(PIN).ok().as_deref()))
+            .clone()
+            .map_err(|problem| setting(PIN, problem))
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            Self::Avx2 => "avx2",
+        }
+    }
+
+    fn choose(pin: Option<&str>) -> std::result::Result<Self, String> {
+        match pin {
+            None | Some("") => Ok(if has_avx2() { Self::Avx2 } else { Self::Portable }),
+            Some("portable") => Ok(Self::Portable),
+            Some("avx2") if has_avx2() => Ok(Self::Avx2),
+            Some("avx2") => Err("this machine has no avx2 with fma, bmi1 and bmi2; use portable, or leave it unset".into()),
+            Some(other) => Err(format!("must be portable or avx2, not {other}")),
+        }
+    }
+}
+
+fn has_avx2() -> bool {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2")
+    return is_x86_feature_detected!("avx2")
         && is_x86_feature_detected!("fma")
         && is_x86_feature_detected!("bmi1")
-        && is_x86_feature_detected!("bmi2")
-    {
-        // SAFETY: the machine has the features that `avx2::run` is compiled for.
+        && is_x86_feature_detected!("bmi2");
+    #[cfg(not(target_arch = "x86_64"))]
+    return false;
+}
+
+/// Run `task` with the chosen vector instructions.
+pub fn run(task: impl Task) {
+    #[cfg(target_arch = "x86_64")]
+    if matches!(Instructions::chosen(), Ok(Instructions::Avx2)) {
+        // SAFETY: avx2 is only chosen where the machine has the features that `avx2::run` is compiled for.
         return unsafe { avx2::run(task) };
     }
     task.run::<Portable>();

@@ -5,6 +5,7 @@
 //! Kolukisa, Ozbulut and Yildiz, Symmetry 2021, 13, 472.
 
 pub mod boundary;
+pub mod breakdown;
 pub mod error;
 pub mod frame;
 mod interpolation;

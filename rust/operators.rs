@@ -48,8 +48,9 @@ pub struct Divergence<'a, const D: usize>(pub &'a [Vector<D>]);
 /// ∇f of the first entry of a field of pairs and ∇²g of the second, the scalar form of (16).
 pub struct GradientAndLaplacian<'a>(pub &'a [[f64; 2]]);
 
-/// ∇²u, component by component, and ∇·u. In the Laplacian of particle i the solid neighbour s shows the velocity `seen(s, i)`.
-pub struct LaplacianAndDivergence<'a, const D: usize, F> {
+/// ∇²u, component by component, and ∂u_k/∂x_l as the entry (k, l). In the Laplacian of particle i the solid neighbour s shows the
+/// velocity `seen(s, i)`.
+pub struct LaplacianAndGradient<'a, const D: usize, F> {
     pub velocity: &'a [Vector<D>],
     pub seen: F,
 }
@@ -133,11 +134,11 @@ impl<const D: usize> Operator<D> for GradientAndLaplacian<'_> {
     }
 }
 
-impl<const D: usize, F: Fn(usize, usize) -> Vector<D> + Sync> Operator<D> for LaplacianAndDivergence<'_, D, F> {
-    type Value = (Vector<D>, f64);
+impl<const D: usize, F: Fn(usize, usize) -> Vector<D> + Sync> Operator<D> for LaplacianAndGradient<'_, D, F> {
+    type Value = (Vector<D>, Matrix<D>);
 
     #[inline(always)]
-    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [(Vector<D>, f64); LANES] {
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [(Vector<D>, Matrix<D>); LANES] {
         let velocity = self.velocity;
         let cluster = near.cluster();
         let here: [V; D] = cluster.vectors(velocity);
@@ -168,11 +169,11 @@ impl<const D: usize, F: Fn(usize, usize) -> Vector<D> + Sync> Operator<D> for La
         );
         let corrections = near.corrections();
         let (laplacian, tensor, shown) = (vectors(laplacian), matrices(tensor), matrices(shown));
-        let divergence = corrected_trace(&tensor, &corrections);
         std::array::from_fn(|lane| {
-            let Correction { laplacian: factor, asymmetry, .. } = &corrections[lane];
+            let Correction { laplacian: factor, asymmetry, inverse } = &corrections[lane];
             let linear = (tensor[lane] + shown[lane]) * asymmetry;
-            ((laplacian[lane] + linear) * *factor, divergence[lane])
+            // α is symmetric.
+            ((laplacian[lane] + linear) * *factor, tensor[lane] * inverse)
         })
     }
 }

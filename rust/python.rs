@@ -1,6 +1,6 @@
 //! The extension module `alsph._alsph`: the only file that knows Python.
 
-use crate::lanes::LANES;
+use crate::lanes::{Instructions, LANES};
 use crate::neighbours::Entry;
 use crate::particles::Matrix;
 use crate::{Clock, Error, ParticleKind, Particles, Report, Settings, Simulation, Vector};
@@ -62,11 +62,9 @@ struct PySimulation(Engine);
 impl PySimulation {
     #[new]
     #[pyo3(signature = (settings, state, threads=None))]
-    fn new(settings: &str, state: &Bound<'_, PyDict>, threads: Option<usize>) -> PyResult<Self> {
+    fn new(settings: &str, state: &Bound<'_, PyDict>, threads: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let settings = Settings::from_json(settings)?;
-        if threads == Some(0) {
-            return Err(ConfigError::new_err("setting `threads`: must be at least 1"));
-        }
+        let threads = threads.map(read_threads).transpose()?;
         let clock = read_clock(state)?;
         Ok(Self(match settings.dimensions {
             2 => Engine::Two(Box::new(Simulation::new(settings, read_particles(state)?, clock, threads)?)),
@@ -133,19 +131,16 @@ impl PySimulation {
     /// Return the particles: the arrays of `state` and ``volume``, ``velocity_divergence``, ``vorticity``.
     fn snapshot<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         match &mut self.0 {
-            Engine::Two(s) => {
-                let (dict, gradient) = snapshot(py, s)?;
-                let vorticity = gradient.iter().map(|g| g[(1, 0)] - g[(0, 1)]).collect::<Vec<_>>();
-                dict.set_item("vorticity", vorticity.into_pyarray(py))?;
-                Ok(dict)
-            }
-            Engine::Three(s) => {
-                let (dict, gradient) = snapshot(py, s)?;
-                let curl =
-                    |g: &Matrix<3>| Vector::from([g[(2, 1)] - g[(1, 2)], g[(0, 2)] - g[(2, 0)], g[(1, 0)] - g[(0, 1)]]);
-                dict.set_item("vorticity", vectors(py, gradient.iter().map(curl)))?;
-                Ok(dict)
-            }
+            Engine::Two(s) => plane_snapshot(py, s),
+            Engine::Three(s) => space_snapshot(py, s),
+        }
+    }
+
+    /// The same for what the step that broke down led to, at the positions before that step; None if none has.
+    fn failed_snapshot<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        match &mut self.0 {
+            Engine::Two(s) => s.look_at_failed(|s| plane_snapshot(py, s)).transpose(),
+            Engine::Three(s) => s.look_at_failed(|s| space_snapshot(py, s)).transpose(),
         }
     }
 
@@ -204,11 +199,17 @@ fn bytes_per_particle(settings: &str) -> PyResult<f64> {
     let ratio = settings.support_radius() / settings.particle_spacing;
     // Neighbours of four particles: a sphere widened by the distance between them.
     let (neighbours, fields) = match settings.dimensions {
-        2 => (std::f64::consts::PI * (ratio + 0.9).powi(2), 18 * size_of::<Vector<2>>()),
-        _ => (4.0 / 3.0 * std::f64::consts::PI * (ratio + 0.9).powi(3), 18 * size_of::<Vector<3>>()),
+        2 => (std::f64::consts::PI * (ratio + 0.9).powi(2), 20 * size_of::<Vector<2>>()),
+        _ => (4.0 / 3.0 * std::f64::consts::PI * (ratio + 0.9).powi(3), 20 * size_of::<Vector<3>>()),
     };
     // The rows grow by doubling, so half of their room may be empty.
     Ok(1.5 * neighbours * (size_of::<Entry>() / LANES) as f64 + fields as f64 + 100.0)
+}
+
+/// Name of the vector instructions in use, ``portable`` or ``avx2``; the environment variable ``ALSPH_INSTRUCTIONS`` pins them.
+#[pyfunction]
+fn instructions() -> PyResult<&'static str> {
+    Ok(Instructions::chosen()?.name())
 }
 
 #[pymodule]
@@ -218,8 +219,12 @@ fn _alsph(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("ConfigError", module.py().get_type::<ConfigError>())?;
     module.add_class::<PySimulation>()?;
     module.add_function(wrap_pyfunction!(time_step_limits, module)?)?;
-    module.add_function(wrap_pyfunction!(bytes_per_particle, module)?)
+    module.add_function(wrap_pyfunction!(bytes_per_particle, module)?)?;
+    module.add_function(wrap_pyfunction!(instructions, module)?)
 }
+
+/// Each thread takes memory of the system, which a wrong number must not exhaust.
+const MOST_THREADS: usize = 4096;
 
 const KIND_NAMES: [&str; 4] = ["fluid", "inlet", "outlet", "solid"];
 
@@ -299,6 +304,13 @@ fn read_particles<const D: usize>(state: &Bound<'_, PyDict>) -> PyResult<Particl
     })
 }
 
+fn read_threads(threads: &Bound<'_, PyAny>) -> PyResult<usize> {
+    match threads.extract::<usize>() {
+        Ok(count) if (1..=MOST_THREADS).contains(&count) => Ok(count),
+        _ => Err(ConfigError::new_err(format!("setting `threads`: must be a whole number from 1 to {MOST_THREADS}"))),
+    }
+}
+
 fn read_clock(state: &Bound<'_, PyDict>) -> PyResult<Clock> {
     fn scalar<'py, T: Default + for<'a> FromPyObject<'a, 'py>>(
         state: &Bound<'py, PyDict>,
@@ -347,6 +359,20 @@ fn snapshot<'py, const D: usize>(
     dict.set_item("volume", snapshot.volume.into_pyarray(py))?;
     dict.set_item("velocity_divergence", divergence.into_pyarray(py))?;
     Ok((dict, snapshot.velocity_gradient))
+}
+
+fn plane_snapshot<'py>(py: Python<'py>, simulation: &mut Simulation<2>) -> PyResult<Bound<'py, PyDict>> {
+    let (dict, gradient) = snapshot(py, simulation)?;
+    let vorticity = gradient.iter().map(|g| g[(1, 0)] - g[(0, 1)]).collect::<Vec<_>>();
+    dict.set_item("vorticity", vorticity.into_pyarray(py))?;
+    Ok(dict)
+}
+
+fn space_snapshot<'py>(py: Python<'py>, simulation: &mut Simulation<3>) -> PyResult<Bound<'py, PyDict>> {
+    let (dict, gradient) = snapshot(py, simulation)?;
+    let curl = |g: &Matrix<3>| Vector::from([g[(2, 1)] - g[(1, 2)], g[(0, 2)] - g[(2, 0)], g[(1, 0)] - g[(0, 1)]]);
+    dict.set_item("vorticity", vectors(py, gradient.iter().map(curl)))?;
+    Ok(dict)
 }
 
 /// A name and the number that it stands for in a report.

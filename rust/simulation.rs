@@ -1,9 +1,11 @@
 //! A simulation: particles, settings and the order of the stages of a step.
 
 use crate::boundary::{self, Walls};
+use crate::breakdown::{self, Symptom};
 use crate::error::{Error, Result, setting};
 use crate::frame::{Frame, Travel};
 use crate::interpolation::interpolate;
+use crate::lanes::Instructions;
 use crate::loads::loads;
 use crate::neighbours::Grid;
 use crate::operators::VelocityGradient;
@@ -37,6 +39,8 @@ pub struct Simulation<const D: usize> {
     dispersion: f64,
     /// Whether `frame` belongs to the present positions.
     prepared: bool,
+    /// The particles as the step that broke down left them.
+    failed: Option<Particles<D>>,
     history: Vec<Report<D>>,
     pool: Arc<ThreadPool>,
 }
@@ -47,6 +51,7 @@ impl<const D: usize> Simulation<D> {
         if settings.dimensions != D {
             return Err(setting("dimensions", format!("{} does not fit {D}-dimensional arrays", settings.dimensions)));
         }
+        Instructions::chosen()?;
         check_particles(&settings, &mut particles)?;
         if !(clock.time.is_finite() && clock.mass_in.is_finite() && clock.mass_out.is_finite()) {
             return Err(setting("state", format!("time and masses must be finite, not {clock:?}")));
@@ -68,6 +73,7 @@ impl<const D: usize> Simulation<D> {
             scheme: Alsph::default(),
             change: Vec::new(),
             prepared: false,
+            failed: None,
             history: Vec::new(),
             pool: Arc::new(pool),
         })
@@ -128,13 +134,14 @@ impl<const D: usize> Simulation<D> {
     fn step(&mut self) -> Result<()> {
         let velocity_max = self.velocity_max();
         let time_step = self.time_step(velocity_max)?;
-        self.prepare();
+        self.prepare_step(Travel { time_step, velocity_max, fraction: self.settings.derivative_frame.fraction() });
         let penalty = self.settings.penalty_constant * velocity_max * velocity_max * time_step;
         let (relaxation, dispersion) = (self.relaxation, self.dispersion);
         let step = Step { settings: &self.settings, time_step, penalty, relaxation, dispersion };
 
         let outcome = self.scheme.iterate(step, &mut self.particles, &mut self.frame, &mut self.walls);
-        if let Err(error) = self.check_fields(time_step) {
+        if let Some(symptom) = breakdown::find(step.settings, &self.particles, &self.frame.stencil.volume, time_step) {
+            let error = self.diverged(symptom, time_step, velocity_max);
             self.restore_initial();
             return Err(error);
         }
@@ -157,9 +164,20 @@ impl<const D: usize> Simulation<D> {
         }
         let velocity_max = self.velocity_max();
         let time_step = self.time_step(velocity_max).unwrap_or(self.settings.time_step);
-        let reorder = self.clock.step.is_multiple_of(STEPS_BETWEEN_SORTS);
-        self.frame.search(&self.settings, &mut self.particles, Travel { time_step, velocity_max }, reorder);
+        self.search(Travel { time_step, velocity_max, fraction: 0.0 });
         self.prepared = true;
+    }
+
+    /// The same at the positions that the derivatives of the step are taken at.
+    fn prepare_step(&mut self, travel: Travel) {
+        if !self.prepared || travel.fraction > 0.0 {
+            self.search(travel);
+        }
+    }
+
+    fn search(&mut self, travel: Travel) {
+        let reorder = self.clock.step.is_multiple_of(STEPS_BETWEEN_SORTS);
+        self.frame.search(&self.settings, &mut self.particles, travel, reorder);
     }
 
     /// Boundary crossings and clock.
@@ -183,7 +201,7 @@ impl<const D: usize> Simulation<D> {
     /// Δt of the next step.
     fn time_step(&self, velocity_max: f64) -> Result<f64> {
         let settings = &self.settings;
-        if !settings.adaptive_time_step {
+        if !settings.adaptive_time_step || settings.adaptive_until.is_some_and(|end| self.clock.time >= end) {
             return Ok(settings.time_step);
         }
         let limits = settings.time_step_limits(velocity_max, self.largest_eigenvalue);
@@ -192,42 +210,41 @@ impl<const D: usize> Simulation<D> {
             let velocity = &self.particles.velocity[..self.particles.real];
             let fastest =
                 (0..velocity.len()).max_by(|&a, &b| velocity[a].norm_squared().total_cmp(&velocity[b].norm_squared()));
-            return Err(self.diverged(fastest.unwrap_or(0), "velocity", velocity_max));
+            let symptom = Symptom { particle: fastest.unwrap_or(0), field: "velocity", value: velocity_max };
+            return Err(self.diverged(symptom, penalty, velocity_max));
         }
         Ok(settings.time_step.min(penalty).min(limits.viscous).min(limits.body_force))
     }
 
-    /// An error if the step left a value that is not a number, or a particle that would cross more than Δx in a step.
-    fn check_fields(&self, time_step: f64) -> Result<()> {
-        let particles = &self.particles;
-        let fastest = self.settings.particle_spacing / time_step;
-        let bad = |i: usize| {
-            let (speed, pressure) = (particles.velocity[i].norm(), particles.pressure[i]);
-            if particles.kind[i] != ParticleKind::Solid && (speed.is_nan() || speed > fastest) {
-                return Some((i, "velocity", speed));
-            }
-            (!pressure.is_finite()).then_some((i, "pressure", pressure))
-        };
-        match parallel::reduce(particles.real, |mut range| range.find_map(bad), Option::or).flatten() {
-            Some((i, field, value)) => Err(self.diverged(i, field, value)),
-            None => Ok(()),
-        }
-    }
-
-    fn diverged(&self, i: usize, field: &'static str, value: f64) -> Error {
-        let particles = &self.particles;
+    fn diverged(&self, symptom: Symptom, time_step: f64, velocity_max: f64) -> Error {
+        let (settings, particles) = (&self.settings, &self.particles);
+        let Symptom { particle: i, field, value } = symptom;
+        let limits = settings.time_step_limits(velocity_max, self.largest_eigenvalue);
+        let cause = breakdown::likely_cause(settings, particles, symptom, time_step, limits);
         let position = particles.position[i].as_slice().to_vec();
         let Clock { time, step, .. } = self.clock;
-        Error::Diverged { step: step + 1, time, particle: particles.id[i], position, field, value }
+        Error::Diverged { step: step + 1, time, particle: particles.id[i], position, field, value, cause }
     }
 
-    /// Go back to the state before the step.
+    /// Go back to the state before the step, and keep the velocities and pressures that it led to.
     fn restore_initial(&mut self) {
         self.particles.drop_images();
         self.particles.position.copy_from_slice(&self.scheme.position_initial);
+        self.failed = Some(self.particles.clone());
         self.particles.velocity.copy_from_slice(&self.scheme.velocity_initial);
         self.particles.pressure.copy_from_slice(&self.scheme.pressure_initial);
         self.prepared = false;
+    }
+
+    /// `look` at the simulation as the step that broke down left it, at the positions before that step; None if none has.
+    pub fn look_at_failed<R>(&mut self, look: impl FnOnce(&mut Self) -> R) -> Option<R> {
+        let good = std::mem::replace(&mut self.particles, self.failed.take()?);
+        self.prepared = false;
+        let result = look(self);
+        self.particles.drop_images();
+        self.failed = Some(std::mem::replace(&mut self.particles, good));
+        self.prepared = false;
+        Some(result)
     }
 
     /// The derived fields of the real particles, in the order of `particles()` after the call.

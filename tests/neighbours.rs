@@ -96,7 +96,7 @@ fn check_moved(points: Vec<Vector<2>>, boundary: &str, speed: f64, deviation: f6
     let direction = |angle: f64| Vector::from([angle.cos(), angle.sin()]);
     particles.velocity.iter_mut().enumerate().for_each(|(i, u)| *u = direction(i as f64) * speed);
     let mut frame = Frame::default();
-    frame.search(&settings, &mut particles, Travel { time_step: 1.0, velocity_max: speed }, true);
+    frame.search(&settings, &mut particles, Travel { time_step: 1.0, velocity_max: speed, fraction: 0.0 }, true);
     for i in 0..particles.real {
         particles.position[i] += particles.velocity[i] + direction(2.5 * i as f64) * (deviation * speed);
     }

@@ -86,7 +86,7 @@ def write_run(path: Path, case=SHORT, *, end=60.0) -> Path:
     angle = np.arange(0.0, 360.0, 5.0)
     for time in np.arange(0.0, end, 0.5):
         profile = 1 - 2 * np.sin(np.radians(angle)) ** 2 + 0.1 * np.sin(SHED * time) * np.sin(np.radians(angle))
-        folder.append_surface(float(time), angle, profile)
+        folder.append_surface(np.array([time]), angle, profile[None])
     for time in np.arange(0.0, end + 1, 10.0):
         folder.append_particles(float(time), particles(case))
     return path

@@ -12,7 +12,7 @@ import pytest
 from alsph import config, io
 from alsph.cases import Cylinder, TaylorGreen
 from alsph.errors import ConfigError, RunFolderError, SolverError
-from alsph.run import _interruptible, resume, start
+from alsph.run import Control, _interruptible, resume, start
 
 HISTORY_COLUMNS = (
     "step time time_step iterations converged divergence_max divergence_mean divergence_sum velocity_max "
@@ -37,7 +37,9 @@ def by_id(state):
 def test_run_folder(small, tmp_path):
     run = small.run(tmp_path / "run", until=0.25, threads=2, output_interval=0.1, progress=False)
     files = {path.name for path in run.path.iterdir()}
-    names = "case.toml run.json history.csv particles.vtkhdf surface.h5 checkpoint.h5 run.log"
+    names = (
+        "case.toml run.json history.csv particles.vtkhdf surface.h5 checkpoint.h5 checkpoint.previous.h5 run.log .lock"
+    )
     assert files == set(names.split())
     assert config.load(run.path / "case.toml").case == small
 
@@ -73,11 +75,13 @@ def test_run_without_a_body(tmp_path):
 def test_resumed_run_is_the_uninterrupted_run_to_the_last_bit(small, tmp_path):
     whole = small.run(tmp_path / "whole", until=0.2, output_interval=0.1, progress=False)
     part = small.run(tmp_path / "part", until=0.1, output_interval=0.1, progress=False)
-    with pytest.raises(RunFolderError, match="has reached its end.*--until 0.2"):
-        resume(part.path, until=0.05, progress=False)
+    for until in (None, 0.05):  # it has reached that already
+        files = {path.name: path.read_bytes() for path in part.path.iterdir()}
+        assert resume(part.path, until=until, progress=False).status == "finished"
+        assert files == {path.name: path.read_bytes() for path in part.path.iterdir()}
     part = resume(part.path, until=0.2, threads=1, progress=False)
     assert (part.path / "history.csv").read_text() == (whole.path / "history.csv").read_text()
-    assert same(*(by_id(io.RunFolder(run.path).read_checkpoint()) for run in (whole, part)))
+    assert same(*(by_id(io.RunFolder(run.path).read_checkpoint().state) for run in (whole, part)))
     assert part.times.tolist() == whole.times.tolist()
     assert config.load(part.path / "case.toml").run.until == 0.2
 
@@ -101,7 +105,7 @@ def test_diverged_run_keeps_the_last_good_state(small, tmp_path):
     info = json.loads((tmp_path / "run" / "run.json").read_text())
     assert info["status"] == "diverged"
     assert "last good state" in info["message"]
-    assert np.isfinite(io.RunFolder(tmp_path / "run").read_checkpoint()["velocity"]).all()
+    assert np.isfinite(io.RunFolder(tmp_path / "run").read_checkpoint().state["velocity"]).all()
     assert "warning: time_step = 0.3" in (tmp_path / "run" / "run.log").read_text()
     assert alsph.open_run(tmp_path / "run").status == "diverged"
 
@@ -153,16 +157,19 @@ def test_existing_folder_is_replaced_only_by_force(small, tmp_path):
 
 def test_a_run_that_is_going_on_is_left_alone(small, tmp_path):
     folder = io.RunFolder(small.run(tmp_path / "run", until=0.05, progress=False).path)
-    folder.write_info(folder.info() | {"status": "running", "pid": os.getppid()})
-    with pytest.raises(RunFolderError, match="is still running it"):
-        resume(folder.path, until=0.1)
-    folder.write_info(folder.info() | {"pid": 2**22 + 1})
+    assert not folder.is_busy()
+    with io.RunFolder(folder.path).claimed():
+        assert folder.is_busy()
+        with pytest.raises(RunFolderError, match=f"process {os.getpid()} on .* is still running it; wait for it"):
+            resume(folder.path, until=0.1)
+        with pytest.raises(RunFolderError, match="is still running it"):
+            small.run(folder.path, force=True)
     assert resume(folder.path, until=0.06, progress=False).status == "finished"
 
 
 def test_run_in_a_thread(small, tmp_path):
     settings = config.Config(small, config.RunSettings(until=0.05))
-    worker = threading.Thread(target=start, args=(settings, tmp_path / "run"), kwargs={"progress": False})
+    worker = threading.Thread(target=start, args=(settings, tmp_path / "run", Control(progress=False)))
     worker.start()
     worker.join()
     assert alsph.open_run(tmp_path / "run").status == "finished"
@@ -190,6 +197,14 @@ def test_stepping(small):
     particles = simulation.snapshot()
     assert len(particles["position"]) == sum(simulation.counts.values())
     assert particles["vorticity"].shape == particles["pressure"].shape
+
+
+def test_rows_that_are_not_kept_take_no_memory(small):
+    simulation = small.simulation()
+    simulation.advance(3)
+    assert simulation.new_history(keep=False)["step"].tolist() == [1, 2, 3]
+    simulation.advance(2)
+    assert simulation.history()["step"].tolist() == [4, 5]
 
 
 def test_steps_are_evenly_spaced(small):
@@ -300,11 +315,20 @@ def test_as_much_leaves_as_enters(small):
 
 
 def test_only_a_second_wish_to_stop_interrupts_at_once(monkeypatch):
-    with _interruptible() as interrupted:
+    interrupted = threading.Event()
+    with _interruptible(interrupted) as signals:
         signal.raise_signal(signal.SIGINT)
         signal.raise_signal(signal.SIGINT)  # the echo from a wrapper that passes the terminal's Ctrl-C on
-        assert interrupted.is_set()
+        assert interrupted.is_set() and signals == [signal.SIGINT, signal.SIGINT]
         now = time.monotonic()
         monkeypatch.setattr(time, "monotonic", lambda: now + 2)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.filterwarnings("ignore:time_step")
+def test_creeping_flow_is_stable_at_the_viscous_limit(small):
+    """With half of this limit: the velocities that the cubic of the wall shows stiffen the viscous term."""
+    simulation = small.replace(reynolds=1, resolution=10).simulation(2)
+    simulation.run_until(0.15)
+    assert simulation.history()["velocity_max"].max() < 2.2

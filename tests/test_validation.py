@@ -118,14 +118,14 @@ def test_a_validation_that_was_cut_goes_on(finished, tmp_path, monkeypatch, lost
 
 
 def test_a_run_that_breaks_down_fails_and_the_others_go_on(finished, monkeypatch):
-    run = validation._run
+    run = validation.complete
 
-    def broken(config, path, progress):
+    def broken(config, path, control):
         if config.case.resolution == 20:
             raise SolverError("step 7: the velocity is no number")
-        return run(config, path, progress)
+        return run(config, path, control)
 
-    monkeypatch.setattr(validation, "_run", broken)
+    monkeypatch.setattr(validation, "complete", broken)
     report = validate(suite=FAST, output=finished.path, progress=False)
     (failed,) = [row for row in report.rows if row.judged]
     assert (failed.resolution, failed.measure.passed, failed.measure.source[:6]) == (20, False, "step 7")

@@ -1,7 +1,7 @@
 //! What solid particles show to the viscous term, and its fourth order.
 
 use alsph::boundary::Walls;
-use alsph::operators::LaplacianAndDivergence;
+use alsph::operators::LaplacianAndGradient;
 use alsph::{ParticleKind, Vector};
 use approx::assert_relative_eq;
 use common::set::Set;
@@ -71,13 +71,13 @@ fn error_of_wave(length: usize, fourth_order: bool) -> f64 {
     let velocity = set.field(|x| Vector::from([(2.0 * PI * x[1]).sin(), 0.0]));
     let laplacian_of = |velocity: &[Vector<2>]| -> Vec<_> {
         let seen = |s: usize, _: usize| velocity[s];
-        set.apply(LaplacianAndDivergence { velocity, seen }).into_iter().map(|(laplacian, _)| laplacian).collect()
+        set.apply(LaplacianAndGradient { velocity, seen }).into_iter().map(|(laplacian, _)| laplacian).collect()
     };
     let mut laplacian = laplacian_of(&velocity);
     if fourth_order {
         let factor = settings.laplacian_dispersion() * settings.particle_spacing.powi(2);
         let mut walls = Walls::new(&settings);
-        walls.sharpen(&settings, &set.particles, &set.frame, &laplacian, factor);
+        walls.sharpen(&settings, &set.particles, &set.frame, |i| laplacian[i], factor);
         let correction = laplacian_of(&walls.dispersion);
         laplacian.iter_mut().zip(correction).for_each(|(laplacian, correction)| *laplacian -= correction);
     }

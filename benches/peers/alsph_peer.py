@@ -11,8 +11,9 @@ from scipy.spatial import cKDTree
 
 def passes(case, iterations):
     """Passes over all pairs in a step: volumes, the first (which forms the corrections too), two of the shift, four an
-    iteration (five with Algorithm 1, which has the volumes in each), two a projection sweep."""
-    return 4 + (5 if case.algorithm == 1 else 4) * iterations + 2 * case.projection_sweeps
+    iteration (five with Algorithm 1: the volumes in each), two a sweep, one for the fourth viscous order."""
+    sharpening = int(case.viscous_order == 4)
+    return 4 + (5 if case.algorithm == 1 else 4) * iterations + 2 * case.projection_sweeps + sharpening
 
 
 def channel_pairs(case, position):
@@ -29,17 +30,18 @@ def channel_pairs(case, position):
 parser = argparse.ArgumentParser()
 parser.add_argument("case", choices=["cylinder", "taylor_green"])
 parser.add_argument("--resolution", type=int, default=20)
-parser.add_argument("--algorithm", type=int, default=2)
-parser.add_argument("--paper", action="store_true", help="five iterations and no projection sweeps, as the paper")
+parser.add_argument("--algorithm", type=int, help="the paper's; in the middle of the step if not given")
+parser.add_argument("--paper", action="store_true", help="five iterations, no sweeps, a viscous term of second order")
 parser.add_argument("--steps", type=int, default=20, help="steps to time, of the cylinder")
 parser.add_argument("--until", type=float, default=1.0, help="time to reach, of the vortex")
 options = parser.parse_args()
 
 WARM_UP = 5
-result = {"code": f"alsph, Algorithm {options.algorithm}{', the paper' if options.paper else ''}"}
-method = {"resolution": options.resolution, "algorithm": options.algorithm}
+algorithm = options.algorithm or (2 if options.paper else "midpoint")
+result = {"code": f"alsph, {algorithm}{', the paper' if options.paper else ''}"}
+method = {"resolution": options.resolution, "algorithm": algorithm}
 if options.paper:
-    method |= {"max_iterations": 5, "projection_sweeps": 0}
+    method |= {"max_iterations": 5, "projection_sweeps": 0, "viscous_order": 2}
 cpu = []
 if options.case == "cylinder":
     case = alsph.cases.Cylinder(reynolds=200, **method)

@@ -28,6 +28,7 @@ CODES = {
 CASES = {
     "cylinder": [
         ("alsph", ["cylinder", "--resolution=20"]),
+        ("alsph", ["cylinder", "--resolution=20", "--algorithm=1"]),
         ("alsph", ["cylinder", "--resolution=20", "--paper"]),
         ("alsph", ["cylinder", "--resolution=20", "--paper", "--algorithm=1"]),
         ("pysph", ["cylinder", "--resolution=20", "--cache"]),

@@ -15,7 +15,10 @@ except ImportError as error:
         f"`maturin develop --release` for development, or `pip install .` to install it [{error}]"
     ) from error
 
-from alsph import cases, errors
+from alsph import cases, errors, study
+from alsph.autotune import autotune
+from alsph.convergence import converge
+from alsph.repetition import repeat
 from alsph.results import Run
 from alsph.run import resume
 from alsph.simulation import Simulation
@@ -24,4 +27,17 @@ from alsph.validation import validate
 open_run = Run
 """Open a run folder: ``alsph.open_run("runs/re200")``."""
 
-__all__ = ["Run", "Simulation", "__version__", "cases", "errors", "open_run", "resume", "validate"]
+__all__ = [
+    "Run",
+    "Simulation",
+    "__version__",
+    "autotune",
+    "cases",
+    "converge",
+    "errors",
+    "open_run",
+    "repeat",
+    "resume",
+    "study",
+    "validate",
+]

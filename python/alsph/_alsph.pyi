@@ -5,7 +5,15 @@ from typing import Any, Self, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ConfigError", "Simulation", "SolverError", "__version__", "bytes_per_particle", "time_step_limits"]
+__all__ = [
+    "ConfigError",
+    "Simulation",
+    "SolverError",
+    "__version__",
+    "bytes_per_particle",
+    "instructions",
+    "time_step_limits",
+]
 
 __version__: str
 
@@ -44,6 +52,9 @@ class Simulation:
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """Return the particles: the arrays of `state` and ``volume``, ``velocity_divergence``, ``vorticity``."""
 
+    def failed_snapshot(self) -> dict[str, NDArray[Any]] | None:
+        """Return what the step that broke down led to, at the positions before that step; None if none has."""
+
     def state(self) -> dict[str, Any]:
         """All that is needed to go on from here to the last bit."""
 
@@ -61,6 +72,9 @@ class Simulation:
 
 def time_step_limits(settings: str, velocity_max: float) -> dict[str, float]:
     """Stable Δt: ``penalty``, ``viscous``, ``body_force`` (inf where not applicable); and ``lambda_max``, λ_max Δx²."""
+
+def instructions() -> str:
+    """Name of the vector instructions in use, ``portable`` or ``avx2``; ``ALSPH_INSTRUCTIONS`` pins them."""
 
 def bytes_per_particle(settings: str) -> float:
     """Estimate the engine's memory per particle, buffers and neighbour list included."""

@@ -1,4 +1,4 @@
-"""The command line: ``alsph run | resume | describe | plot | info | cases | validate``.
+"""The command line: ``alsph run | resume | repeat | describe | plot | info | validate | study | autotune | converge``.
 
 The options of ``run`` and ``describe`` are the fields of the case and of :class:`alsph.config.RunSettings`.
 """
@@ -15,13 +15,18 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import typer
 from typer.core import TyperGroup
 
-from alsph import _alsph, cases, config, plotting
+from alsph import _alsph, cases, config, plotting, study
+from alsph.autotune import autotune
 from alsph.config import Config, RunSettings
+from alsph.convergence import converge
 from alsph.describe import describe
-from alsph.errors import AlsphError
+from alsph.errors import AlsphError, ConfigError, Interrupted, WalltimeError
 from alsph.parameters import Parameters, describe_default
+from alsph.progress import seconds_of
+from alsph.repetition import repeat
 from alsph.results import Run
-from alsph.run import resume, start
+from alsph.run import Control, resume, start
+from alsph.study.board import overview
 from alsph.validation import validate
 
 INTERRUPTED = 130
@@ -29,15 +34,18 @@ INTERRUPTED = 130
 
 @contextmanager
 def _exit_codes() -> Iterator[None]:
-    """Turn errors into one line on stderr and an exit code: 2 user's mistake, 1 solver, 130 Ctrl-C."""
+    """Turn errors into one line on stderr and an exit code, see docs/reliability.md."""
     try:
         yield
+    except WalltimeError as stop:
+        typer.echo(str(stop), err=True)
+        raise typer.Exit(stop.exit_code) from None
     except (AlsphError, OSError) as error:
         typer.secho(f"error: {error}", fg="red", err=True)
         raise typer.Exit(error.exit_code if isinstance(error, AlsphError) else 2) from None
     except KeyboardInterrupt as stop:
         typer.echo(str(stop) or "interrupted", err=True)
-        raise typer.Exit(INTERRUPTED) from None
+        raise typer.Exit(stop.exit_code if isinstance(stop, Interrupted) else INTERRUPTED) from None
 
 
 class CaseGroup(TyperGroup):
@@ -57,7 +65,19 @@ class Commands(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of the commands."""
-        return ["cases", "describe", "run", "resume", "info", "plot", "validate"]
+        return [
+            "cases",
+            "describe",
+            "run",
+            "resume",
+            "repeat",
+            "info",
+            "plot",
+            "validate",
+            "study",
+            "autotune",
+            "converge",
+        ]
 
 
 app = typer.Typer(
@@ -76,9 +96,46 @@ group_settings: dict[str, Any] = {
 }
 run_app = typer.Typer(help="Run a case, or a file, into a run folder.", **group_settings)
 describe_app = typer.Typer(help="Tell beforehand what a run will take.", **group_settings)
+autotune_app = typer.Typer(help="Find the largest stable time step and the cheapest iterations.", **group_settings)
+converge_app = typer.Typer(help="Run a case at several resolutions and judge its convergence.", **group_settings)
 app.add_typer(run_app, name="run")
 app.add_typer(describe_app, name="describe")
+app.add_typer(autotune_app, name="autotune")
+app.add_typer(converge_app, name="converge")
 
+
+class StudyGroup(TyperGroup):
+    """``alsph study NAME`` stands for ``alsph study run NAME``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put ``run`` before anything that is no command."""
+        if args and args[0] not in (*self.commands, "--help"):
+            args = ["run", *args]
+        return super().parse_args(ctx, args)
+
+
+study_app = typer.Typer(
+    cls=StudyGroup,
+    no_args_is_help=True,
+    subcommand_metavar="NAME|FILE.toml [OPTIONS] | COMMAND",
+    help="Run a parameter study, draw its figures and write its tables.",
+    epilog="alsph study NAME stands for alsph study run NAME. Start with: alsph study list",
+)
+app.add_typer(study_app, name="study")
+
+StudyName = Annotated[str, typer.Argument(metavar="NAME|FILE.toml", help="study: see alsph study list")]
+Preset = Annotated[str | None, typer.Option(help="preset of the study", show_default="its first")]
+StudyOutput = Annotated[Path, typer.Option("--output", "-o", help="folder for runs and results")]
+Jobs = Annotated[int | None, typer.Option(help="runs at a time", show_default="cores / threads")]
+Scheduler = Annotated[
+    str | None, typer.Option(help="address of a Dask scheduler, tcp://HOST:8786", show_default="local processes")
+]
+
+Walltime = Annotated[
+    str | None, typer.Option(metavar="HH:MM:SS", help="end with a checkpoint before this time", show_default="none")
+]
+Retry = Annotated[int, typer.Option(help="how often a run that breaks down goes back and on with half the time step")]
+Threads = Annotated[int | None, typer.Option(help="number of threads", show_default="the run's")]
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="run folder")]
 
 
@@ -86,8 +143,11 @@ def _run(
     configuration: Config,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="run folder", show_default="runs/CASE")] = None,
     force: Annotated[bool, typer.Option("--force", help="replace an existing run folder")] = False,
+    walltime: Walltime = None,
+    retry: Retry = 0,
 ) -> None:
-    _report(start(configuration, output or Path("runs") / configuration.case.name, force=force))
+    control = Control(walltime=seconds_of(walltime), retry=retry)
+    _report(start(configuration, output or Path("runs") / configuration.case.name, control, force=force))
 
 
 def _describe(
@@ -95,6 +155,42 @@ def _describe(
     probe: Annotated[bool, typer.Option(help="take a few steps to estimate the time")] = True,
 ) -> None:
     _print_table(describe(configuration, probe=probe))
+
+
+def _autotune(
+    configuration: Config,
+    divergence: Annotated[float, typer.Option(help="mean |∇·u| that is good enough [U/D]")] = 1e-3,
+    develop: Annotated[float, typer.Option(help="time for which the flow is developed first [D/U]")] = 3.0,
+    probe: Annotated[float, typer.Option(help="length of each probe [D/U]")] = 1.0,
+    margin: Annotated[float, typer.Option(help="fraction of the largest stable step that is used [-]")] = 0.9,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="folder for report and case", show_default="runs/autotune/CASE"),
+    ] = None,
+) -> None:
+    folder = output or Path("runs/autotune") / configuration.case.name
+    tuning = autotune(
+        configuration.case, divergence, develop=develop, probe=probe, margin=margin, threads=configuration.run.threads
+    )
+    tuning.save(folder)
+    typer.echo(f"\n{tuning}\n\nalsph run {folder / 'case.toml'}")
+
+
+def _converge(
+    configuration: Config,
+    resolutions: Annotated[str, typer.Option(help="three or more resolutions D/Δx, as 10,14,20")] = "10,14,20",
+    jobs: Jobs = None,
+    output: StudyOutput = Path("runs/studies"),
+    scheduler: Scheduler = None,
+) -> None:
+    try:
+        ladder = [int(text) for text in resolutions.split(",")]
+    except ValueError:
+        raise ConfigError(f"resolutions = {resolutions!r}: must be whole numbers with commas, as 10,14,20") from None
+    threads = configuration.run.threads or 1
+    report = converge(configuration, ladder, output, jobs=jobs, threads=threads, scheduler=scheduler)
+    typer.echo(f"\n{report}\n{report.path / 'convergence.md'}")
+    raise typer.Exit(not report.results.complete)
 
 
 def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Callable[..., None]:
@@ -165,7 +261,12 @@ def _choice_of(choices: tuple[Any, ...]) -> Callable[[str], Any]:
 
 
 for _model in cases.CASES.values():
-    for _group, _action in ((run_app, _run), (describe_app, _describe)):
+    for _group, _action in (
+        (run_app, _run),
+        (describe_app, _describe),
+        (autotune_app, _autotune),
+        (converge_app, _converge),
+    ):
         _help = (_model.__doc__ or "").split("\n\nParameters\n")[0]
         _group.command(_model.name, help=_help, short_help=_model.title)(_case_command(_model, _action))
 
@@ -175,10 +276,24 @@ for _model in cases.CASES.values():
 def _resume(
     path: RunPath,
     until: Annotated[float | None, typer.Option(help="new end time [D/U]", show_default="the run's")] = None,
-    threads: Annotated[int | None, typer.Option(help="number of threads", show_default="the run's")] = None,
+    threads: Threads = None,
+    walltime: Walltime = None,
+    retry: Retry = 0,
 ) -> None:
-    """Go on with a run from its last checkpoint."""
-    _report(resume(path, until, threads))
+    """Go on with a run from its newest sound checkpoint; one that has reached its end stays as it is."""
+    _report(resume(path, until, threads, walltime=seconds_of(walltime), retry=retry))
+
+
+@app.command("repeat")
+@_exit_codes()
+def _repeat(path: RunPath, threads: Threads = None) -> None:
+    """Repeat a run from its start, without writing anything, and compare it bit by bit.
+
+    The exit code is 1 if it is not the same.
+    """
+    repetition = repeat(path, threads)
+    typer.echo(str(repetition))
+    raise typer.Exit(not repetition.same)
 
 
 @app.command("plot")
@@ -239,6 +354,70 @@ def _validate(
     report = validate(*(names or ()), full=full, resolutions=resolution or (), threads=threads, output=output)
     typer.echo(f"\n{report}\n{report.path / 'report.md'}")
     raise typer.Exit(not report.passed)
+
+
+@study_app.command("run")
+@_exit_codes()
+def _study_run(
+    name: StudyName,
+    preset: Preset = None,
+    output: StudyOutput = Path("runs/studies"),
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="only tell what would be run")] = False,
+    jobs: Jobs = None,
+    threads: Annotated[int, typer.Option(help="threads of each run")] = 1,
+    scheduler: Scheduler = None,
+    walltime: Walltime = None,
+) -> None:
+    """Run what is missing of a study, draw its figures and write its tables.
+
+    Runs are named by a hash of their configuration: those that have finished are used again, also by other studies,
+    and those that were cut go on. The exit code is 1 if a run failed; one that diverged is a result.
+    """
+    declared = study.load(name, preset)
+    if dry_run:
+        _print_states(declared, output)
+        return
+    results = study.run(
+        declared, output, jobs=jobs, threads=threads, scheduler=scheduler, walltime=seconds_of(walltime)
+    )
+    typer.echo(f"\n{results}")
+    _print_results(results)
+    raise typer.Exit(not results.complete)
+
+
+@study_app.command("status")
+@_exit_codes()
+def _study_status(name: StudyName, preset: Preset = None, output: StudyOutput = Path("runs/studies")) -> None:
+    """Tell how far the runs of a study are, whoever runs them."""
+    _print_states(study.load(name, preset), output)
+
+
+@study_app.command("draw")
+@_exit_codes()
+def _study_draw(name: StudyName, preset: Preset = None, output: StudyOutput = Path("runs/studies")) -> None:
+    """Write tables and figures of the runs that there are, without running anything."""
+    declared = study.load(name, preset)
+    results = study.Results.of(declared, declared.points(), output)
+    results.save()
+    _print_results(results)
+
+
+@study_app.command("list")
+def _study_list() -> None:
+    """List the studies that come with alsph."""
+    _print_table([(name, study.load(name).title) for name in study.shipped()])
+
+
+def _print_results(results: study.Results) -> None:
+    for warning in results.warnings:
+        typer.secho(f"warning: {warning}", fg="yellow", err=True)
+    typer.echo(results.path / "results.md")
+
+
+def _print_states(declared: study.Study, output: Path) -> None:
+    points = declared.points()
+    for line in overview(points, study.states(points, output)):
+        typer.echo(line)
 
 
 @app.command("info")

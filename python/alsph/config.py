@@ -1,9 +1,10 @@
 """Configuration files: a case and the settings of a run, from and to TOML."""
 
 import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import tomli_w
 from pydantic import Field
@@ -11,6 +12,8 @@ from pydantic import Field
 from alsph import cases
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters
+
+Made = TypeVar("Made")
 
 
 class RunSettings(Parameters):
@@ -40,11 +43,24 @@ class Config:
         """End time [D/U]."""
         return self.run.until or self.case.default_until
 
+    @property
+    def work(self) -> float:
+        """About how many pairs of particles a run goes over: what the time that it takes is proportional to."""
+        case = self.case
+        neighbours = case.support_layers**case.space_dimensions
+        iteration = 8 if case.algorithm in (1, "original") else 4
+        passes = 5 + iteration * case.max_iterations + 2 * case.projection_sweeps
+        steps = self.until * case.resolution / case.time_step
+        return float(case.particle_estimate() * neighbours * steps * passes)
+
     def tables(self) -> dict[str, Any]:
         """Return the content of the configuration file; what is not set is left out."""
-        run = self.run.model_dump(exclude_none=True) | {"until": self.until}
-        parameters = {name: getattr(self.case, name) for name in self.case.parameter_names()}
-        return {"case": self.case.name} | parameters | {"run": run}
+        return self.case_tables() | {"run": self.run.model_dump(exclude_none=True) | {"until": self.until}}
+
+    def case_tables(self) -> dict[str, Any]:
+        """Return the same without the settings of the run."""
+        values = {name: getattr(self.case, name) for name in self.case.parameter_names()}
+        return {"case": self.case.name} | {name: value for name, value in values.items() if value is not None}
 
     def save(self, path: Path) -> None:
         """Write the configuration with all its parameters to a TOML file."""
@@ -80,8 +96,19 @@ def load(path: str | Path) -> Config:
     ConfigError
         If it cannot be read or used; the message starts with the file's name.
     """
+    return read(path, from_tables)
+
+
+def read(path: str | Path, make: Callable[[dict[str, Any]], Made]) -> Made:
+    """Return what a function makes of the tables of a TOML file.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read, or the function raises one; the message starts with the file's name.
+    """
     try:
-        return from_tables(tomllib.loads(Path(path).read_text(encoding="utf-8")))
+        return make(tomllib.loads(Path(path).read_text(encoding="utf-8")))
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -15,7 +15,25 @@ class RunFolderError(AlsphError):
     """A run folder cannot be created, written, read or resumed."""
 
 
+class DamagedError(RunFolderError):
+    """A file does not hold what was written to it."""
+
+
 class SolverError(AlsphError, RuntimeError):
     """The computation broke down; the message names step, time, particle, position and field."""
 
     exit_code = 1
+
+
+class WalltimeError(AlsphError):
+    """A run has used up the time that it was given, and can be resumed."""
+
+    exit_code = 75
+
+
+class Interrupted(KeyboardInterrupt):
+    """A run was stopped by Ctrl-C or a signal, and can be resumed; ``exit_code`` is 128 and the signal's number."""
+
+    def __init__(self, message: str, number: int = 2) -> None:
+        super().__init__(message)
+        self.exit_code = 128 + number

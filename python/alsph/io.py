@@ -1,32 +1,38 @@
 """The run folder, as it is written: see docs/architecture.md for its files.
 
-Every file is opened, appended to and closed, or written under a temporary name and renamed, so that a run that is cut
-leaves a folder that can be read and resumed. Files are not locked, so that a viewer that has one open stops no run.
+Whatever cuts a run, it can be resumed: see :mod:`alsph.durable`. One process at a time writes to a
+folder, which holds its lock; the files themselves are not locked, so that a viewer that has one open stops no run.
 """
 
 import csv
 import json
 import os
-import platform
 import shutil
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import h5py
+import filelock
 import numpy as np
 from numpy.typing import NDArray
 
-from alsph import config, reading, vtkhdf
-from alsph.errors import ConfigError, RunFolderError
+from alsph import checkpoint, config, reading, vtkhdf
+from alsph.checkpoint import Checkpoint
+from alsph.durable import flush, growing, replacing
+from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.geometry import FloatArray
+from alsph.reading import sound
 
 AXES = ("x", "y", "z")
+LOCK = ".lock"
+CHECKPOINTS = ("checkpoint.h5", "checkpoint.previous.h5")
 SPARE_BYTES = 2 * 2**20
 """Room that must stay free on the disk beside what is written next."""
+PATIENCE_SECONDS = 2.0
+"""How long the lock of a folder is waited for: a killed process holds it while the system clears it away."""
 
 
 @dataclass(frozen=True)
@@ -44,31 +50,78 @@ class RunFolder:
     def check_new(self, *, force: bool) -> None:
         """Check, without touching anything, that the folder can be created (or, with `force`, replaced)."""
         if self.path.exists():
-            if not force:
+            found = {entry.name for entry in self.path.iterdir()} if self.path.is_dir() else {self.path.name}
+            if found - {LOCK} and not force:
                 raise RunFolderError(
                     f"{self.path}: exists already; give another folder, `alsph resume` it, or use --force"
                 )
-            if not self.path.is_dir() or (any(self.path.iterdir()) and not self._file("run.json").exists()):
+            if found and not found & {LOCK, "run.json"}:
                 raise RunFolderError(
                     f"{self.path}: not a run folder, so --force does not replace it; give another folder"
                 )
-            self.check_idle()
         parent = next(parent for parent in self.path.absolute().parents if parent.exists())
         if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
             raise RunFolderError(f"{self.path}: cannot be created, {parent} is not a folder that can be written to")
 
+    @contextmanager
+    def claimed(self) -> Iterator[None]:
+        """Hold the folder, which is made if it does not exist; another process that wants to write to it is refused."""
+        with self._writing():
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._check_entries()
+            lock = filelock.FileLock(self._file(LOCK), timeout=PATIENCE_SECONDS, fallback_to_soft=False)
+            try:
+                lock.acquire()
+            except filelock.Timeout:
+                raise RunFolderError(f"{self.path}: {self._holder()}; wait for it or stop it first") from None
+        try:
+            yield
+        finally:
+            lock.release()
+
+    def _check_entries(self) -> None:
+        """Refuse a folder through which files elsewhere would be written."""
+        for entry in self.path.iterdir():
+            if entry.is_symlink() or not (entry.is_file() or entry.is_dir()):
+                raise RunFolderError(
+                    f"{entry}: a link or a special file; alsph does not write to a folder that has one"
+                )
+
+    def is_busy(self) -> bool:
+        """Whether a living process, wherever it is, holds the folder."""
+        if not self._file(LOCK).exists():
+            return False
+        try:
+            with filelock.FileLock(self._file(LOCK), timeout=0, fallback_to_soft=False):
+                return False
+        except filelock.Timeout:
+            return True
+        except OSError:  # a folder that can only be read
+            return False
+
+    def _holder(self) -> str:
+        """Who is at work in the folder, in words."""
+        info = self.last_info()
+        machine = info.get("machine")
+        name = machine.get("name") if isinstance(machine, dict) else None
+        return f"process {info.get('pid', '?')} on {name or 'a machine not known'} is still running it"
+
     def create(self, configuration: config.Config, size: int = 0) -> None:
-        """Create the folder with the resolved configuration if `size` bytes will fit; what it held is removed."""
+        """Begin with the resolved configuration if `size` bytes will fit; what the folder held is removed."""
         self._make_room(size)
         with self._writing():
-            if self.path.exists():
-                shutil.rmtree(self.path)
-            self.path.mkdir(parents=True)
+            self.path.mkdir(parents=True, exist_ok=True)
+            # What tells that this is a run folder goes last, so that a cut leaves one.
+            for path in sorted(self.path.iterdir(), key=lambda path: path.name in ("case.toml", "run.json")):
+                if path.is_dir() and not path.is_symlink():
+                    shutil.rmtree(path)
+                elif path.name != LOCK:
+                    path.unlink()
         self.write_config(configuration)
 
     def write_config(self, configuration: config.Config) -> None:
         """Replace ``case.toml``."""
-        with self._writing(), self._replacing("case.toml") as path:
+        with self._writing(), replacing(self._file("case.toml")) as path:
             configuration.save(path)
 
     def config(self) -> config.Config:
@@ -79,26 +132,20 @@ class RunFolder:
         except ConfigError as error:
             raise RunFolderError(f"{error}; the folder is damaged or was made by another version") from None
 
-    def check_idle(self) -> None:
-        """Check that no other living process on this machine is writing to the folder."""
-        info: dict[str, Any] = self.info() if self._file("run.json").exists() else {}
-        pid: Any = info.get("pid")
-        here = info.get("machine", {}).get("name") == platform.node() and os.name == "posix"
-        if info.get("status") != "running" or not here or pid == os.getpid():
-            return
-        try:
-            os.kill(int(pid), 0)
-        except (OSError, TypeError, ValueError):
-            return
-        raise RunFolderError(f"{self.path}: process {pid} is still running it; wait for it or stop it first")
-
     def info(self) -> dict[str, Any]:
         """Return the content of ``run.json``."""
         return reading.info(self._file("run.json"))
 
+    def last_info(self) -> dict[str, Any]:
+        """Return the same, or nothing where it is missing or damaged: what a run can go on without."""
+        try:
+            return self.info()
+        except RunFolderError:
+            return {}
+
     def write_info(self, info: dict[str, Any]) -> None:
         """Replace ``run.json``."""
-        with self._writing(), self._replacing("run.json") as path:
+        with self._writing(), replacing(self._file("run.json")) as path:
             path.write_text(json.dumps(info, indent=2) + "\n", encoding="utf-8")
 
     def log(self, line: str) -> None:
@@ -114,7 +161,7 @@ class RunFolder:
             writer = csv.writer(file, lineterminator="\n")
             if file.tell() == 0:
                 writer.writerow(columns)
-            writer.writerows(zip(*(map(_text, column.tolist()) for column in columns.values()), strict=True))
+            writer.writerows(history_lines(rows, bodies))
 
     def append_particles(self, time: float, particles: dict[str, NDArray[Any]]) -> None:
         """Append an output to ``particles.vtkhdf``."""
@@ -122,10 +169,10 @@ class RunFolder:
         with self._writing():
             vtkhdf.append(self._file("particles.vtkhdf"), time, particles)
 
-    def append_surface(self, time: float, angle: FloatArray, pressure_coefficient: FloatArray) -> None:
-        """Append a sample of the pressure coefficient (m,) at the angles (m,) [degrees] to ``surface.h5``."""
+    def append_surface(self, time: FloatArray, angle: FloatArray, pressure_coefficient: FloatArray) -> None:
+        """Append to ``surface.h5``: samples (k, m) of C_p at times (k,) and angles (m,) [degrees]."""
         self._make_room(pressure_coefficient.nbytes)
-        with self._writing(), h5py.File(self._file("surface.h5"), "a", locking=False) as file:
+        with self._writing(), growing(self._file("surface.h5")) as file:
             if "time" not in file:
                 file["angle"] = angle
                 file.create_dataset(
@@ -133,55 +180,89 @@ class RunFolder:
                 )
                 file.create_dataset("time", (0,), float, maxshape=(None,), chunks=(64,))
             samples = len(file["time"])
-            for name, value in (("pressure_coefficient", pressure_coefficient), ("time", time)):
-                file[name].resize(samples + 1, axis=0)
-                file[name][samples] = value
+            for name, values in (("pressure_coefficient", pressure_coefficient), ("time", time)):
+                file[name].resize(samples + len(values), axis=0)
+                file[name][samples:] = values
 
-    def write_checkpoint(self, state: dict[str, Any]) -> None:
-        """Replace ``checkpoint.h5``."""
+    def write_breakdown(self, outputs: list[tuple[float, dict[str, NDArray[Any]]]]) -> Path:
+        """Replace ``breakdown.vtkhdf``: the particles before and after the step that broke down."""
+        self._make_room(sum(size_of(particles) for _, particles in outputs))
+        path = self._file("breakdown.vtkhdf")
+        with self._writing(), replacing(path) as temporary:
+            for time, particles in outputs:
+                vtkhdf.append(temporary, time, particles)
+        return path
+
+    def write_checkpoint(self, state: dict[str, Any], case: dict[str, Any]) -> None:
+        """Write ``checkpoint.h5``; the one before is kept. The history up to it is made safe first."""
         self._make_room(size_of(state))
-        with self._writing(), self._replacing("checkpoint.h5") as path, h5py.File(path, "w") as file:
-            for name, value in state.items():
-                if np.ndim(value):
-                    file.create_dataset(name, data=value, compression="gzip", compression_opts=1, shuffle=True)
-                else:
-                    file.attrs[name] = value
-
-    def read_checkpoint(self) -> dict[str, Any]:
-        """Return the state in ``checkpoint.h5``."""
-        self._require("checkpoint.h5")
-        try:
-            with h5py.File(self._file("checkpoint.h5"), "r") as file:
-                state = {name: value.item() for name, value in file.attrs.items()}
-                state |= {name: table[()] for name, table in file.items()}
-                if not state.keys() >= {"time", "step", "position"}:
-                    raise KeyError("no time, step or position")
-                return state
-        except (OSError, KeyError) as error:
-            raise RunFolderError(f"{self._file('checkpoint.h5')}: not a checkpoint, or damaged: {error}") from None
-
-    def truncate(self, step: int, time: float) -> None:
-        """Drop the rows, outputs and samples that are later than a checkpoint."""
         with self._writing():
-            if self._file("history.csv").exists() and self._file("history.csv").stat().st_size:
-                self._truncate_history(step)
-            if self._file("particles.vtkhdf").exists():
-                vtkhdf.truncate(self._file("particles.vtkhdf"), time)
-            if self._file("surface.h5").exists():
-                with h5py.File(self._file("surface.h5"), "r+", locking=False) as file:
-                    keep = int(np.searchsorted(file["time"][:], time, side="right"))
-                    for name in ("pressure_coefficient", "time"):
-                        file[name].resize(keep, axis=0)
+            if self._file("history.csv").exists():
+                flush(self._file("history.csv"))
+            checkpoint.write(self._file(CHECKPOINTS[0]), self._file(CHECKPOINTS[1]), state, case)
 
-    def _truncate_history(self, last: int) -> None:
-        """Keep the complete rows up to a step."""
-        with self._file("history.csv").open(encoding="utf-8") as file, self._replacing("history.csv") as path:
-            header = next(file)
-            step, columns = header.rstrip().split(",").index("step"), header.count(",")
-            complete = (row for row in file if row.endswith("\n") and row.count(",") == columns)
-            with path.open("w", encoding="utf-8") as new:
-                new.write(header)
-                new.writelines(row for row in complete if int(row.split(",")[step]) <= last)
+    def has_checkpoint(self) -> bool:
+        """Whether there is a checkpoint, be it damaged."""
+        return any(self._file(name).exists() for name in CHECKPOINTS)
+
+    def read_checkpoint(self) -> Checkpoint:
+        """Return the newest checkpoint that is sound."""
+        errors: list[DamagedError] = []
+        for name in CHECKPOINTS:
+            try:
+                found = checkpoint.read(self._file(name))
+            except DamagedError as error:
+                errors.append(error)
+                continue
+            damaged = errors and self._file(CHECKPOINTS[0]).exists()
+            return replace(found, warning=f"{errors[0]}; going back to {name}") if damaged else found
+        raise errors[0]
+
+    def has_previous_checkpoint(self) -> bool:
+        """Whether there is one before the newest."""
+        return self._file(CHECKPOINTS[1]).exists()
+
+    def drop_newest_checkpoint(self) -> None:
+        """Let the checkpoint before the newest take its place."""
+        with self._writing():
+            self._file(CHECKPOINTS[1]).replace(self._file(CHECKPOINTS[0]))
+            flush(self.path)
+
+    def set_damaged_aside(self) -> None:
+        """Keep the newest checkpoint, which is damaged, from displacing the sound one before it."""
+        with self._writing():
+            self._file(CHECKPOINTS[0]).replace(self._file("checkpoint.damaged.h5"))
+
+    def truncate(self, step: int, time: float) -> list[str]:
+        """Drop the rows, outputs and samples later than a checkpoint, all of them before the first step.
+
+        Returns
+        -------
+        list of str
+            Which files were damaged; they are set aside under another name.
+        """
+        damaged = []
+        with self._writing():
+            if step == 0:
+                for name in ("history.csv", "particles.vtkhdf", "surface.h5"):
+                    self._file(name).unlink(missing_ok=True)
+            parts: dict[str, Callable[[Path], None]] = {
+                "history.csv": lambda path: _truncate_history(path, step),
+                "particles.vtkhdf": lambda path: vtkhdf.truncate(path, time),
+                "surface.h5": lambda path: _truncate_surface(path, time),
+            }
+            for name, cut in parts.items():
+                path = self._file(name)
+                if not path.exists():
+                    continue
+                try:
+                    cut(path)
+                except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError) as error:
+                    if isinstance(error, OSError) and error.errno is not None:  # the disk's, not the file's
+                        raise
+                    path.replace(path.with_name(f"{path.stem}.damaged{path.suffix}"))
+                    damaged.append(f"{name} is damaged ({error}) and set aside as {path.stem}.damaged{path.suffix}")
+        return damaged
 
     def _file(self, name: str) -> Path:
         return self.path / name
@@ -190,22 +271,12 @@ class RunFolder:
         if not self._file(name).is_file():
             raise RunFolderError(f"{self.path}: not a run folder that alsph can use, it has no {name}")
 
-    @contextmanager
-    def _replacing(self, name: str) -> Iterator[Path]:
-        """Give a temporary path and rename it to `name` at the end."""
-        temporary = self._file(f".{name}.new")
-        try:
-            yield temporary
-            temporary.replace(self._file(name))
-        finally:
-            temporary.unlink(missing_ok=True)
-
     def _make_room(self, size: int) -> None:
         """Check that `size` bytes will fit, so that no file is left half-written by a full disk."""
         existing = next(folder for folder in (self.path, *self.path.absolute().parents) if folder.exists())
         free, needed = shutil.disk_usage(existing).free, size + SPARE_BYTES
         if free < needed:
-            resumable = self._file("checkpoint.h5").exists()
+            resumable = self.has_checkpoint()
             remedy = f"go on with: alsph resume {self.path}" if resumable else "try again, or use another disk"
             raise RunFolderError(
                 f"{self.path}: disk full, {free / 2**20:.1f} MiB are free and {needed / 2**20:.1f} MiB are needed; "
@@ -218,6 +289,27 @@ class RunFolder:
             yield
         except OSError as error:
             raise RunFolderError(f"{self.path}: cannot be written: {error}") from None
+
+
+def _truncate_history(path: Path, last: int) -> None:
+    """Keep the complete rows up to a step."""
+    with path.open("rb") as file, replacing(path) as new_path:
+        header = next(file, b"")
+        if header and not (header.startswith(b"step,") and header.endswith(b"\n")):
+            raise ValueError("its first line does not name its columns")
+        with new_path.open("wb") as new:
+            new.write(header)
+            for row in file:
+                number = row.split(b",")[0] if row.count(b",") == header.count(b",") and row.endswith(b"\n") else b""
+                if number.isdigit() and int(number) <= last:
+                    new.write(row)
+
+
+def _truncate_surface(path: Path, time: float) -> None:
+    with growing(path) as file:
+        keep = int(np.searchsorted(sound(file, "time")[:], time, side="right"))
+        for name in ("pressure_coefficient", "time"):
+            sound(file, name).resize(keep, axis=0)
 
 
 def size_of(arrays: dict[str, Any]) -> int:
@@ -236,6 +328,12 @@ def flatten(rows: dict[str, NDArray[Any]], bodies: list[str]) -> dict[str, NDArr
             for component, axis in zip(values[:, index].T, AXES if values.shape[2] > 1 else ("",), strict=False):
                 columns[f"{body}_{name}_{axis}".rstrip("_")] = component
     return columns
+
+
+def history_lines(rows: dict[str, NDArray[Any]], bodies: list[str]) -> list[list[str]]:
+    """Return the rows as they stand in ``history.csv``."""
+    columns = (map(_text, column.tolist()) for column in flatten(rows, bodies).values())
+    return [list(row) for row in zip(*columns, strict=True)]
 
 
 def _text(value: float) -> str:

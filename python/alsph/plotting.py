@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -82,32 +84,85 @@ def field(
     ConfigError
         If there is no such field, or the snapshot is in 3-D.
     """
-    style = field_style(name)
-    if snapshot.position.shape[1] != 2:
-        raise ConfigError("pictures are drawn in 2-D only; open particles.vtkhdf in ParaView")
-    values = np.linalg.norm(snapshot.velocity, axis=1) if name == "velocity" else getattr(snapshot, name)
-    left, right, bottom, top = extent = view or _extent(snapshot, spacing)
-    picture, body = _raster(snapshot, values, spacing, extent)
-    limit = limit or _limit(picture)
+    field_style(name)
+    left, right, bottom, top = extent = _extent(snapshot, spacing, view)
     width = 9.0
     figure = Figure(
         figsize=(width, max(2.5, 0.81 * width * (top - bottom) / (right - left) + 0.75)), layout="compressed"
     )
     axes = figure.subplots()
+    _draw_field(axes, snapshot, name, spacing, extent, limit)
+    axes.set(title=f"{TIME_LABEL} = {snapshot.time:.2f}")
+    return figure
+
+
+def fields(
+    snapshots: dict[str, tuple[Snapshot, float]],
+    names: Sequence[str],
+    view: Sequence[float] | None = None,
+) -> Figure:
+    """Pictures of several fields in 2-D, one row for each snapshot and one column for each field.
+
+    Parameters
+    ----------
+    snapshots : dict
+        Snapshot and particle spacing Δx [D] by the title of the row.
+    names : sequence of str
+        Names of the fields; the colour scale of a field is that of its first row.
+    view : (left, right, bottom, top), optional
+        Part of the plane to show [D]; all of it if None.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such field, or a snapshot is in 3-D.
+    """
+    (first, spacing), *_ = snapshots.values()
+    left, right, bottom, top = extent = _extent(first, spacing, view)
+    width = 6.5
+    height = 0.85 * width * (top - bottom) / (right - left) + 0.6
+    figure = Figure(figsize=(width * len(names), height * len(snapshots)), layout="constrained")
+    grid = figure.subplots(len(snapshots), len(names), squeeze=False)
+    for column, name in zip(grid.T, names, strict=True):
+        limit: float | None = None
+        for axes, (title, (snapshot, spacing)) in zip(column, snapshots.items(), strict=True):
+            limit = _draw_field(axes, snapshot, name, spacing, extent, limit)
+            axes.set_title(f"{title}, {TIME_LABEL} = {snapshot.time:.2f}", fontsize="medium")
+    return figure
+
+
+def _draw_field(
+    axes: Axes,
+    snapshot: Snapshot,
+    name: str,
+    spacing: float,
+    extent: tuple[float, float, float, float],
+    limit: float | None,
+) -> float:
+    """Draw a field with its colour bar; return the end of the colour scale."""
+    style = field_style(name)
+    values = np.linalg.norm(snapshot.velocity, axis=1) if name == "velocity" else getattr(snapshot, name)
+    picture, body = _raster(snapshot, values, spacing, extent)
+    limit = limit or _limit(picture)
     lowest = -limit if style.signed else 0.0
     frame: dict[str, Any] = {"extent": extent, "origin": "lower"}
     image = axes.imshow(picture, cmap=style.colours, vmin=lowest, vmax=limit, interpolation="bilinear", **frame)
     if body.any():
         axes.contourf(body, levels=[0.5, np.inf], colors=["0.35"], **frame)
-    figure.colorbar(
+    axes.figure.colorbar(
         image, ax=axes, label=style.label, extend="both" if style.signed else "max", pad=0.02, fraction=0.05
     )
-    axes.set(xlabel="$x/D$", ylabel="$y/D$", title=f"{TIME_LABEL} = {snapshot.time:.2f}", aspect="equal")
-    return figure
+    axes.set(xlabel="$x/D$", ylabel="$y/D$", aspect="equal")
+    return limit
 
 
-def _extent(snapshot: Snapshot, spacing: float) -> tuple[float, float, float, float]:
-    """Return left, right, bottom and top of the domain: the space of the fluid without the inlet and outlet buffers."""
+def _extent(snapshot: Snapshot, spacing: float, view: Sequence[float] | None) -> tuple[float, float, float, float]:
+    """Return left, right, bottom and top of the view; without one, of the fluid without inlet and outlet buffers."""
+    if snapshot.position.shape[1] != 2:
+        raise ConfigError("pictures are drawn in 2-D only; open particles.vtkhdf in ParaView")
+    if view:
+        left, right, bottom, top = view
+        return left, right, bottom, top
     position = snapshot.position[snapshot.kind == Kind.FLUID]
     bounds = np.array([position.min(axis=0) - spacing / 2, position.max(axis=0) + spacing / 2])
     (left, bottom), (right, top) = np.round(bounds / spacing) * spacing
@@ -291,6 +346,65 @@ def profile(curves: dict[str, Profile]) -> Figure:
     axes.set_title(curve.name, fontsize="medium")
     axes.grid(alpha=0.3)
     axes.legend()
+    return figure
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A series of points to draw.
+
+    Attributes
+    ----------
+    label : str
+        Its name in the legend.
+    x, y : list of float
+    uncertainty : list of float
+        Half lengths of the error bars; none are drawn if empty or zero.
+    style : str
+        Matplotlib's format; the next colour and marker if empty.
+    """
+
+    label: str
+    x: list[float]
+    y: list[float]
+    uncertainty: list[float] = dataclass_field(default_factory=list)
+    style: str = ""
+
+
+def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str] = ()) -> Figure:
+    """Curves over a common abscissa, one panel for each ordinate, three in a row.
+
+    Parameters
+    ----------
+    panels : dict
+        The curves of each panel by the label of its ordinate.
+    label : str
+        Label of the abscissa.
+    logarithmic : sequence of {"x", "y"}
+        Logarithmic axes.
+    """
+    columns = min(len(panels), 3)
+    rows = -(-len(panels) // columns)
+    figure = Figure(figsize=(6.5 * columns, 4.5 * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False).flat
+    for axes, (name, curves) in zip(grid, panels.items(), strict=False):
+        for index, curve in enumerate(curves):
+            style = curve.style or f"C{index}{'osD^v<>pPX'[index % 10]}-"
+            axes.plot(curve.x, curve.y, style, ms=5, lw=1, label=curve.label)
+            if np.nansum(curve.uncertainty) > 0:
+                axes.errorbar(curve.x, curve.y, curve.uncertainty, fmt="none", ecolor=style[:2], capsize=2, lw=1)
+        if "x" in logarithmic:
+            axes.set_xscale("log")
+            ticks = sorted({x for curve in curves for x in curve.x})
+            axes.set_xticks(ticks, [f"{x:.3g}" for x in ticks])
+            axes.xaxis.minorticks_off()
+        if "y" in logarithmic:
+            axes.set_yscale("log")
+        axes.set(xlabel=label, ylabel=name)
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize="small")
+    for axes in list(figure.axes)[len(panels) :]:
+        axes.remove()
     return figure
 
 

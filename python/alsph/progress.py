@@ -1,5 +1,7 @@
 """Progress of a run: a live bar on a terminal, a plain line every ten seconds elsewhere."""
 
+import math
+import re
 import time as clock
 from types import TracebackType
 from typing import Any, Self
@@ -8,6 +10,8 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.text import Text
+
+from alsph.errors import ConfigError
 
 PLAIN_SECONDS = 10.0
 
@@ -53,9 +57,14 @@ class Reporter:
             self._live.stop()
 
     def update(self, rows: dict[str, Any]) -> None:
-        """Report new rows of the history."""
-        if not self._enabled or not len(rows["step"]):
-            return
+        """Report new rows of the history; where nobody listens any more, say nothing from then on."""
+        if self._enabled and len(rows["step"]):
+            try:
+                self._report(rows)
+            except (OSError, ValueError, SystemExit):  # a closed pipe or terminal, which must not end a run
+                self._enabled = False
+
+    def _report(self, rows: dict[str, Any]) -> None:
         now = clock.monotonic()
         self._steps += len(rows["step"])
         time, seconds = float(rows["time"][-1]), now - self._start
@@ -83,6 +92,23 @@ def physics_line(rows: dict[str, Any]) -> str:
         parts += [f"C_D {last['drag_coefficient']:.3f}", f"C_L {last['lift_coefficient']:+.3f}"]
     count = sum(int(last[kind]) for kind in ("fluid", "inlet", "outlet", "solid"))
     return "  ".join([*parts, f"{count} particles"])
+
+
+def seconds_of(text: str | None) -> float:
+    """Return a length of time given as [D-]HH:MM:SS in seconds; without end if None.
+
+    Raises
+    ------
+    ConfigError
+        If the text is no such length.
+    """
+    if text is None:
+        return math.inf
+    match = re.fullmatch(r"(?:(\d+)-)?(\d+):([0-5]\d):([0-5]\d)", text)
+    if not match:
+        raise ConfigError(f"walltime = {text!r}: must be [D-]HH:MM:SS, as 01:30:00 or 2-00:00:00")
+    days, hours, minutes, seconds = (int(part or 0) for part in match.groups())
+    return float(((24 * days + hours) * 60 + minutes) * 60 + seconds)
 
 
 def duration(seconds: float) -> str:

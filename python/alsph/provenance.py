@@ -19,6 +19,7 @@ def provenance(threads: int) -> dict[str, Any]:
         | {name: version(name) for name in ("numpy", "h5py")},
         "commit": _commit(),
         "threads": threads,
+        "instructions": _alsph.instructions(),
         "machine": {
             "name": platform.node(),
             "system": platform.platform(),
@@ -35,8 +36,8 @@ def describe(facts: dict[str, Any]) -> str:
     versions = ", ".join(f"{name} {number}" for name, number in facts["versions"].items())
     machine = facts["machine"]
     return (
-        f"{versions}, commit {facts['commit']}, {facts['threads']} threads on {machine['name']} "
-        f"({machine['processor']}, {machine['cores']} cores, {machine['system']}): {facts['command']}"
+        f"{versions}, commit {facts['commit']}, {facts['threads']} threads, {facts['instructions']} instructions, on "
+        f"{machine['name']} ({machine['processor']}, {machine['cores']} cores, {machine['system']}): {facts['command']}"
     )
 
 

@@ -15,6 +15,11 @@ from numpy.typing import NDArray
 from alsph.errors import RunFolderError
 from alsph.geometry import FloatArray, Kind
 
+LARGEST_EXPANSION = 1032
+"""Bytes that deflate makes of one byte at most."""
+
+FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
+
 SNAPSHOT_FIELDS = ("velocity", "pressure", "velocity_divergence", "vorticity", "kind")
 
 
@@ -61,7 +66,7 @@ def _refusing(path: Path, *errors: type[Exception]) -> Iterator[None]:
 
 def case(path: Path) -> dict[str, Any]:
     """Read ``case.toml``: the parameters by name, the ``run`` table among them."""
-    with _refusing(path, OSError, ValueError):
+    with _refusing(path, OSError, ValueError, RecursionError):
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     for name in ("resolution", "reynolds"):
         if not isinstance(content.get(name), (int, float)) or not content[name] > 0:
@@ -71,10 +76,25 @@ def case(path: Path) -> dict[str, Any]:
 
 def info(path: Path) -> dict[str, Any]:
     """Read ``run.json``."""
-    with _refusing(path, OSError, ValueError):
+    with _refusing(path, OSError, ValueError, RecursionError):
         content = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(content, dict):
         raise RunFolderError(f"{path}: holds no table; is this a run folder of alsph?")
+    kinds: dict[str, Any] = {
+        "time": (int, float),
+        "seconds": (int, float),
+        "step": int,
+        "segments": list,
+        "retries": list,
+        "machine": dict,
+        "checkpoint": dict,
+    }
+    parts = content.get("segments", [])
+    if any(name in content and not isinstance(content[name], kind) for name, kind in kinds.items()) or not all(
+        isinstance(part, dict) and isinstance(part.get("step"), int) and isinstance(part.get("case"), dict)
+        for part in parts
+    ):
+        raise RunFolderError(f"{path}: damaged, an entry is not of its kind")
     return content
 
 
@@ -97,9 +117,41 @@ def history(path: Path) -> dict[str, FloatArray]:
 @contextmanager
 def _opened(path: Path) -> Iterator[h5py.File]:
     """Open an HDF5 file without a lock, so that a run that writes it is not disturbed."""
-    with _refusing(path, OSError, KeyError, ValueError, IndexError, TypeError):
+    with _refusing(path, OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError):
         with h5py.File(path, "r", locking=False) as file:
             yield file
+
+
+def sound(file: h5py.Group, name: str) -> h5py.Dataset:
+    """Return an array in an HDF5 file if it can be read without harm.
+
+    What a header says is believed only as far as the bytes of the file bear it out: an array that is larger than they
+    can be expanded to, lies in another file, or does not consist of plain numbers is refused.
+
+    Raises
+    ------
+    ValueError
+        If it is not to be read.
+    """
+    array = file
+    for part in name.split("/"):
+        link = array.get(part, getlink=True) if isinstance(array, h5py.Group) else None
+        if link is None:
+            raise KeyError(f"no {name}")
+        if not isinstance(link, h5py.HardLink):
+            raise ValueError(f"{name} is a link to elsewhere")
+        array = array[part]
+    if not isinstance(array, h5py.Dataset) or array.is_virtual or array.external:
+        raise ValueError(f"{name} is no array of this file")
+    if array.dtype.kind not in "iufb" or array.dtype.hasobject:
+        raise ValueError(f"{name} is of type {array.dtype}, not of numbers")
+    filters = array.id.get_create_plist()
+    if {filters.get_filter(index)[0] for index in range(filters.get_nfilters())} - FILTERS:
+        raise ValueError(f"{name} is compressed in a way that alsph does not use")
+    stored = array.id.get_storage_size()
+    if array.size * array.dtype.itemsize > LARGEST_EXPANSION * stored:
+        raise ValueError(f"{name} claims {array.shape} entries, more than its {stored} bytes can hold")
+    return array
 
 
 def surface(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -107,7 +159,8 @@ def surface(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
     if not path.exists():
         return np.empty(0), np.empty(0), np.empty((0, 0))
     with _opened(path) as file:
-        angle, time, samples = (np.asarray(file[name], float) for name in ("angle", "time", "pressure_coefficient"))
+        names = ("angle", "time", "pressure_coefficient")
+        angle, time, samples = (np.asarray(sound(file, name), float) for name in names)
         if angle.ndim != 1 or time.ndim != 1 or samples.ndim != 2 or samples.shape[1] != len(angle):
             raise ValueError(f"shapes {angle.shape}, {time.shape}, {samples.shape} do not match")
     count = min(len(time), len(samples))
@@ -119,22 +172,21 @@ def snapshot_times(path: Path) -> FloatArray:
     if not path.exists():
         return np.empty(0)
     with _opened(path) as file:
-        steps = file["VTKHDF/Steps"]
-        return np.asarray(steps["Values"][: steps.attrs["NSteps"]], float)
+        return np.asarray(sound(file, "VTKHDF/Steps/Values")[: file["VTKHDF/Steps"].attrs["NSteps"]], float)
 
 
 def snapshot(path: Path, step: int) -> Snapshot:
     """Read one snapshot of ``particles.vtkhdf``."""
     with _opened(path) as file:
         root = file["VTKHDF"]
-        part = int(root["Steps/PartOffsets"][step])
-        first = int(root["Steps/PointOffsets"][step])
-        rows = slice(first, first + int(root["NumberOfPoints"][part]))
-        position = np.asarray(root["Points"][rows], float)
-        fields = {name: np.asarray(root["PointData"][name][rows], float) for name in SNAPSHOT_FIELDS}
+        part = int(sound(root, "Steps/PartOffsets")[step])
+        first = int(sound(root, "Steps/PointOffsets")[step])
+        rows = slice(first, first + int(sound(root, "NumberOfPoints")[part]))
+        position = np.asarray(sound(root, "Points")[rows], float)
+        fields = {name: np.asarray(sound(root, f"PointData/{name}")[rows], float) for name in SNAPSHOT_FIELDS}
         if not len(position) == rows.stop - rows.start > 0:
             raise ValueError(f"snapshot {step} is incomplete")
-        time = float(root["Steps/Values"][step])
+        time = float(sound(root, "Steps/Values")[step])
     dimensions = 3 if fields["vorticity"].ndim == 2 else 2
     kind = fields.pop("kind").astype(np.uint8)
     velocity = fields.pop("velocity")[:, :dimensions]

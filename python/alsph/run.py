@@ -6,36 +6,111 @@ import os
 import signal
 import threading
 import time as clock
+import warnings
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 import numpy as np
 
+from alsph import checkpoint, config
+from alsph.checkpoint import Checkpoint
 from alsph.config import Config
-from alsph.errors import AlsphError, RunFolderError, SolverError
+from alsph.errors import AlsphError, ConfigError, DamagedError, Interrupted, RunFolderError, SolverError, WalltimeError
 from alsph.io import RunFolder, size_of
 from alsph.progress import Reporter, duration
 from alsph.provenance import describe, peak_memory, provenance
 from alsph.results import Run
 from alsph.simulation import SLICE_SECONDS, Simulation, next_multiple
 
+RETRY_FACTOR = 0.5
+"""By how much a retry shortens the time step and its share of the stability law."""
 
-def start(config: Config, path: Path, *, force: bool = False, progress: bool = True) -> Run:
-    """Run a case from its start in a new run folder; see :meth:`alsph.cases.Case.run`."""
-    folder = RunFolder(path)
+FIXED = ("dimensions", "particle_spacing", "smoothing_ratio", "kernel", "domain", "bodies")
+"""Settings of the engine that the particles were made for: they cannot change in mid-run."""
+
+
+@dataclass(frozen=True)
+class Control:
+    """What a run obeys beside its configuration.
+
+    Attributes
+    ----------
+    progress : bool
+        Report progress.
+    stop : threading.Event
+        Ends the run as Ctrl-C does once it is set, which another thread may do.
+    walltime : float
+        Seconds after which the run is to have written a checkpoint and ended.
+    retry : int
+        How often a run that breaks down goes back to a checkpoint and on with a smaller time step.
+    """
+
+    progress: bool = True
+    stop: threading.Event = field(default_factory=threading.Event)
+    walltime: float = math.inf
+    retry: int = 0
+    deadline: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Refuse numbers without sense."""
+        object.__setattr__(self, "deadline", clock.monotonic() + self.walltime)
+        if not self.walltime > 0:
+            raise ConfigError(f"walltime = {self.walltime}: must be above zero [s]")
+        if not (isinstance(self.retry, int) and self.retry >= 0):
+            raise ConfigError(f"retry = {self.retry}: must be a whole number, 0 or more")
+
+
+def start(config: Config, path: Path, control: Control | None = None, *, force: bool = False) -> Run:
+    """Run a case from its start in a new run folder: :meth:`alsph.cases.Case.run`."""
+    control, folder = control or Control(), RunFolder(path)
     folder.check_new(force=force)
     simulation = config.case.simulation(config.run.threads)
-    folder.create(config, 2 * size_of(simulation.problem.state))
-    if warning := config.case.time_step_warning():
-        folder.log(f"warning: {warning}")
-    _Driver(config, folder, simulation).run(progress)
+    with folder.claimed():
+        folder.check_new(force=force)  # another process may have been faster
+        folder.create(config, 2 * size_of(simulation.problem.state))
+        if warning := config.case.time_step_warning():
+            folder.log(f"warning: {warning}")
+        _Driver(config, folder, simulation, {}).run(control)
     return Run(path)
 
 
-def resume(path: str | Path, until: float | None = None, threads: int | None = None, *, progress: bool = True) -> Run:
-    """Go on with a run from its checkpoint.
+def complete(config: Config, path: Path, control: Control | None = None) -> Run:
+    """Return the finished run of a case in a folder: as it is there, resumed, or run from the start.
+
+    A folder with another case in it, or without a checkpoint that can be read, is replaced. The number of threads is
+    that of `config`.
+    """
+    if (path / "case.toml").exists():
+        folder = RunFolder(path)
+        kept = folder.config()
+        info = folder.last_info()
+        # Retries shorten the time step: the run is still that of the case that it began with.
+        began = info["segments"][0]["case"] if info.get("retries") else kept.case_tables()
+        if (began, kept.until) == (config.case_tables(), config.until):
+            if info.get("status") == "finished":
+                return Run(path)
+            try:
+                folder.read_checkpoint()
+            except DamagedError:
+                pass
+            else:
+                return _resume(folder, None, config.run.threads, control or Control())
+    return start(config, path, control, force=True)
+
+
+def resume(
+    path: str | Path,
+    until: float | None = None,
+    threads: int | None = None,
+    *,
+    walltime: float = math.inf,
+    retry: int = 0,
+    progress: bool = True,
+) -> Run:
+    """Go on with a run from its newest checkpoint that is sound; a run that has reached its end stays as it is.
 
     Parameters
     ----------
@@ -45,86 +120,175 @@ def resume(path: str | Path, until: float | None = None, threads: int | None = N
         New end time [D/U]; the run's own if None.
     threads
         Number of threads; the run's own if None.
-    progress
-        Report progress.
+    walltime, retry, progress
+        As in :meth:`alsph.cases.Case.run`.
+
+    Warns
+    -----
+    RuntimeWarning
+        If the newest checkpoint is damaged, or the settings in ``case.toml`` are not those that the run was made with.
 
     Raises
     ------
     RunFolderError
-        If the folder cannot be resumed.
-    SolverError, KeyboardInterrupt
+        If the folder cannot be resumed, or another process is at work in it.
+    SolverError, WalltimeError, Interrupted
         As :meth:`alsph.cases.Case.run`.
     """
-    folder = RunFolder(Path(path))
-    config, info = folder.config(), folder.info()
-    folder.check_idle()
-    if unknown := [name for name in config.case.parameter_names() if name not in config.case.model_fields_set]:
+    return _resume(RunFolder(Path(path)), until, threads, Control(progress, walltime=walltime, retry=retry))
+
+
+def _resume(folder: RunFolder, until: float | None, threads: int | None, control: Control) -> Run:
+    folder.config()  # refuses what is no run folder before the claim makes one
+    with folder.claimed():
+        config, info = folder.config(), folder.last_info()
+        _check_parameters(config, folder)
+        changes = {name: value for name, value in (("until", until), ("threads", threads)) if value is not None}
+        own_end, config = config.until, Config(config.case, config.run.replace(**changes))
+        saved = folder.read_checkpoint()
+        if not isinstance(saved.state["time"], float):
+            raise RunFolderError(f"{folder.path}: its checkpoint is of no time")
+        if saved.state["time"] >= config.until:
+            if info.get("status") != "finished" and saved.state["time"] >= own_end:  # cut after its last step
+                folder.write_info(info | {"status": "finished"})
+            return Run(folder.path)
+        remarks = [saved.warning] if saved.warning else []
+        if changed := _changes(config, saved, folder):
+            remarks.append(f"goes on with other settings than before: {', '.join(changed)}")
+        simulation = _restored(config, saved, folder)
+        if saved.warning:
+            folder.set_damaged_aside()
+        remarks += folder.truncate(simulation.step, simulation.time)
+        folder.write_config(config)
+        for remark in remarks:
+            folder.log(f"warning: {remark}")
+            warnings.warn(f"{folder.path}: {remark}", RuntimeWarning, stacklevel=3)
+        _Driver(config, folder, simulation, info).run(control)
+    return Run(folder.path)
+
+
+def _check_parameters(config: Config, folder: RunFolder) -> None:
+    """Refuse a file that does not say what it should: the defaults may not be those that it was made with."""
+    fields = type(config.case).model_fields
+    given = config.case.model_fields_set | {name for name, field in fields.items() if field.default is None}
+    if unknown := [name for name in config.case.parameter_names() if name not in given]:
         raise RunFolderError(
-            f"{path}/case.toml does not say what {', '.join(unknown)} was: the run is of an older version, and the "
-            "defaults of this one would change its method; add the values that it was made with, or run it again"
+            f"{folder.path}/case.toml does not say what {', '.join(unknown)} was: the run is of an older version, and "
+            "the defaults of this one would change its method; add the values that it was made with, or run it again"
         )
-    changes = {name: value for name, value in (("until", until), ("threads", threads)) if value is not None}
-    config = Config(config.case, config.run.replace(**changes))
-    state = folder.read_checkpoint()
-    if state["time"] >= config.until:
+
+
+def _changes(now: Config, saved: Checkpoint, folder: RunFolder) -> list[str]:
+    """Say how the case differs from the one that a checkpoint was made with."""
+    if saved.case is None or saved.case == now.case_tables():
+        return []
+    try:
+        before = config.from_tables(saved.case).case
+    except ConfigError as error:
+        raise RunFolderError(f"{folder.path}: the case of its checkpoint cannot be used: {error}") from None
+    old, new = (case.problem(saved.state).settings for case in (before, now.case))
+    if fixed := [name for name in FIXED if old[name] != new[name]]:
         raise RunFolderError(
-            f"{path}: has reached its end, t* = {state['time']:.4g}; go on with --until {2 * state['time']:.3g}"
+            f"{folder.path}/case.toml has been changed in what the particles were made for ({', '.join(fixed)}); "
+            "undo the change, or start a new run"
         )
-    simulation = Simulation(config.case.problem(state), config.run.threads)
-    folder.truncate(simulation.step, simulation.time)
-    folder.write_config(config)
-    _Driver(config, folder, simulation, float(info.get("seconds", 0))).run(progress)
-    return Run(path)
+    tables = now.case_tables()
+    names = [name for name in saved.case | tables if saved.case.get(name) != tables.get(name)]
+    return [f"{name} = {tables.get(name)} (was {saved.case.get(name)})" for name in names]
+
+
+def _restored(config: Config, saved: Checkpoint, folder: RunFolder) -> Simulation:
+    try:
+        return Simulation(config.case.problem(saved.state), config.run.threads)
+    except ConfigError as error:
+        raise RunFolderError(f"{folder.path}: its checkpoint does not fit its case: {error}") from None
 
 
 class _Driver:
-    """One run in progress; `seconds` is the time that it has taken before."""
+    """One run in progress; `info` is what ``run.json`` says of it before."""
 
-    def __init__(self, config: Config, folder: RunFolder, simulation: Simulation, seconds: float = 0.0) -> None:
-        self.config, self.folder, self.simulation = config, folder, simulation
+    def __init__(self, config: Config, folder: RunFolder, simulation: Simulation, info: dict[str, Any]) -> None:
+        self.folder = folder
+        self.started = clock.monotonic() - float(info.get("seconds", 0))
+        self.provenance = provenance(simulation.threads)
+        self.segments: list[dict[str, Any]] = info.get("segments", [])
+        self.retries: list[dict[str, Any]] = info.get("retries", [])
+        self.rewound = False
+        self.time_step = math.inf
+        self.pause = 0.0
+        self._go_on_with(config, simulation)
+
+    def _go_on_with(self, config: Config, simulation: Simulation) -> None:
+        """Take a case and a simulation of it, and note from which step on."""
+        self.config, self.simulation = config, simulation
         self.bodies = [body["name"] for body in simulation.problem.settings["bodies"]]
         self.surface = config.case.surface_points()
-        self.started = clock.monotonic() - seconds
-        self.provenance = provenance(simulation.threads)
-        self.unwritten: list[dict[str, Any]] = []
-        self.flushed = self.checkpointed = clock.monotonic()
         self.next_output = next_multiple(simulation.time, config.run.output_interval)
         self.next_surface = next_multiple(simulation.time, config.run.surface_interval)
+        self.unwritten: list[dict[str, Any]] = []
+        self.samples: list[tuple[float, Any]] = []
+        self.flushed = self.checkpointed = clock.monotonic()
+        self._note_checkpoint(simulation.state())
+        self.written = simulation.step or -1
+        self.segments = [part for part in self.segments if part["step"] < simulation.step]
+        if not self.segments or self.segments[-1]["case"] != config.case_tables():
+            self.segments.append({"step": simulation.step, "case": config.case_tables()})
 
-    def run(self, progress: bool) -> None:
+    def run(self, control: Control) -> None:
         """Step to the end time, and leave a valid folder however the run ends."""
-        self.folder.log(
-            f"{'resumed' if self.simulation.step else 'started'} at {self.where}: {describe(self.provenance)}"
-        )
-        with Reporter(self.config.until, self.simulation.time, enabled=progress) as reporter:
+        self.deadline = control.deadline
+        verb = "resumed" if self.simulation.step else "started"
+        self.folder.log(f"{verb} at {self.where}: {describe(self.provenance)}")
+        with Reporter(self.config.until, self.simulation.time, enabled=control.progress) as reporter:
             try:
-                with _interruptible() as interrupted:
-                    finished = self._loop(reporter, interrupted)
-            except SolverError as error:
-                raise SolverError(self._rescue(str(error))) from None
+                with _interruptible(control.stop) as signals:
+                    finished = self._work(reporter, control)
+            except SolverError:
+                raise
             except BaseException as error:
                 with contextlib.suppress(AlsphError):
                     self._write_status("failed", str(error))
                 raise
-        if not finished:
-            raise KeyboardInterrupt(f"stopped at {self.where}; go on with: alsph resume {self.folder.path}")
+        if finished:
+            return
+        go_on = f"stopped at {self.where}; go on with: alsph resume {self.folder.path}"
+        if control.stop.is_set():
+            raise Interrupted(go_on, signals[0] if signals else signal.SIGINT)
+        raise WalltimeError(f"time limit of {duration(control.walltime)} reached: {go_on}")
 
-    def _loop(self, reporter: Reporter, interrupted: threading.Event) -> bool:
-        """Step until the end (True) or until interrupted (False)."""
+    def _work(self, reporter: Reporter, control: Control) -> bool:
+        """Step until the end (True), or until interrupted or out of time (False); breakdowns are retried."""
+        for attempt in range(control.retry + 1):
+            try:
+                return self._loop(reporter, control.stop)
+            except SolverError as error:
+                message = self._rescue(str(error))
+                if attempt == control.retry:
+                    raise SolverError(message) from None
+                self._rewind(message)
+        raise AssertionError("the last attempt returns or raises")
+
+    def _loop(self, reporter: Reporter, stop: threading.Event) -> bool:
         if self.simulation.step == 0:
             self._output()
         self._write_status("running")
-        while self.simulation.time < self.config.until and not interrupted.is_set():
+        while self.simulation.time < self.config.until and not stop.is_set():
+            began = clock.monotonic()
             self.simulation.run_until(min(self.next_surface, self.next_output, self.config.until), SLICE_SECONDS)
             reporter.update(self._record())
+            self.pause = max(self.pause, clock.monotonic() - began)
+            if clock.monotonic() + 2 * self.pause >= self.deadline:
+                break
         finished = self.simulation.time >= self.config.until
         self._checkpoint("finished" if finished else "interrupted")
         return finished
 
     def _record(self) -> dict[str, Any]:
         """Write what is due, and return the new rows of the history."""
-        rows, now, time = self.simulation.new_history(), clock.monotonic(), self.simulation.time
+        rows, now, time = self.simulation.new_history(keep=False), clock.monotonic(), self.simulation.time
         self.unwritten.append(rows)
+        if len(rows["time_step"]):
+            self.time_step = float(rows["time_step"][-1])
         if time >= self.next_surface:
             self.next_surface = next_multiple(time, self.config.run.surface_interval)
             self._sample_surface(rows)
@@ -140,9 +304,8 @@ class _Driver:
     def _sample_surface(self, rows: dict[str, Any]) -> None:
         """Sample C_p = (p − p_0) / (½ρU²), with p_0 the pressure at the inlet."""
         if self.surface:
-            angle, points = self.surface
-            pressure = self.simulation.sample(points)["pressure"]
-            self.folder.append_surface(self.simulation.time, angle, 2 * (pressure - rows["inlet_pressure"][-1]))
+            pressure = self.simulation.sample(self.surface[1])["pressure"]
+            self.samples.append((self.simulation.time, 2 * (pressure - rows["inlet_pressure"][-1])))
 
     def _output(self) -> None:
         self.folder.append_particles(self.simulation.time, self.simulation.snapshot())
@@ -157,21 +320,50 @@ class _Driver:
 
     def _checkpoint(self, status: str = "running") -> None:
         self._flush()
-        self.folder.write_checkpoint(self.simulation.state())
-        self.checkpointed = clock.monotonic()
+        if self.samples and self.surface:
+            times, samples = (np.array(values) for values in zip(*self.samples, strict=True))
+            self.folder.append_surface(times, self.surface[0], samples)
+            self.samples = []
+        if self.written != self.simulation.step:  # else it is there, and must not displace the one before
+            state = self.simulation.state()
+            self.folder.write_checkpoint(state, self.config.case_tables())
+            self._note_checkpoint(state)
+            self.rewound, self.written = False, self.simulation.step
         self._write_status(status)
+        self.checkpointed = clock.monotonic()
+
+    def _note_checkpoint(self, state: dict[str, Any]) -> None:
+        digest = checkpoint.digest(state)
+        self.saved = {"step": self.simulation.step, "time": self.simulation.time, "state_sha256": digest}
 
     def _rescue(self, message: str) -> str:
         """Keep what can be had of a run that broke down; the last checkpoint stays as it is."""
-        kept = self.folder.read_checkpoint()["time"]
+        message += f"; the last good state, t* = {self.saved['time']:.4g}, is in {self.folder.path / 'checkpoint.h5'}"
         with contextlib.suppress(AlsphError):
-            self.unwritten.append(self.simulation.new_history())
+            self.unwritten.append(self.simulation.new_history(keep=False))
             self._flush()
-            if self.simulation.time > kept:
-                self.folder.append_particles(self.simulation.time, self.simulation.snapshot())
-        message += f"; the last good state, t* = {kept:.4g}, is in {self.folder.path / 'checkpoint.h5'}"
-        self._write_status("diverged", message)
+            path = self.folder.write_breakdown(self.simulation.breakdown())
+            message += f", the particles before and after the step in {path}"
+        with contextlib.suppress(AlsphError):
+            self._write_status("diverged", message)
         return message
+
+    def _rewind(self, message: str) -> None:
+        """Take smaller steps from the newest checkpoint on, or from the one before it if that was no help."""
+        if self.rewound and self.folder.has_previous_checkpoint():
+            self.folder.drop_newest_checkpoint()
+        saved = self.folder.read_checkpoint()
+        case = self.config.case
+        taken = min(case.time_step, self.time_step / case.particle_spacing)
+        shorter = case.replace(time_step=RETRY_FACTOR * taken, time_step_safety=RETRY_FACTOR * case.time_step_safety)
+        config, broke_down = Config(shorter, self.config.run), self.where
+        self._go_on_with(config, _restored(config, saved, self.folder))
+        self.rewound = True
+        self.folder.write_config(config)
+        self.folder.truncate(self.simulation.step, self.simulation.time)
+        self.retries = [retry for retry in self.retries if retry["step"] <= self.simulation.step]
+        self.retries.append({"step": self.simulation.step, "time_step": shorter.time_step, "message": message})
+        self.folder.log(f"retry: back from {broke_down} to {self.where}, with time_step = {shorter.time_step:.4g}")
 
     def _write_status(self, status: str, message: str = "") -> None:
         seconds = round(clock.monotonic() - self.started, 3)
@@ -182,10 +374,13 @@ class _Driver:
             "time": self.simulation.time,
             "until": self.config.until,
             "step": self.simulation.step,
+            "checkpoint": self.saved,
             "particles": self.simulation.counts,
             "seconds": seconds,
             "peak_memory_bytes": peak_memory(),
             "pid": os.getpid(),
+            "segments": self.segments,
+            "retries": self.retries,
         }
         self.folder.write_info(facts | self.provenance)
         if status != "running":
@@ -198,24 +393,25 @@ class _Driver:
 
 
 @contextlib.contextmanager
-def _interruptible() -> Iterator[threading.Event]:
-    """Give an event that Ctrl-C and SIGTERM set, so that no write is cut short.
+def _interruptible(event: threading.Event) -> Iterator[list[int]]:
+    """Have Ctrl-C and SIGTERM set an event, so that no write is cut short; gives the signals that have come.
 
     Another one a second later or more interrupts at once; before, it is an echo from the terminal or a wrapper.
     """
-    event, first = threading.Event(), math.inf
+    first, numbers = math.inf, []
 
-    def handler(_number: int, _frame: FrameType | None) -> None:
+    def handler(number: int, _frame: FrameType | None) -> None:
         nonlocal first
         if clock.monotonic() > first + 1.0:
             raise KeyboardInterrupt
         first = min(first, clock.monotonic())
+        numbers.append(number)
         event.set()
 
     main = threading.current_thread() is threading.main_thread()
     previous = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGTERM) if main}
     try:
-        yield event
+        yield numbers
     finally:
         for number, old in previous.items():
             signal.signal(number, old)

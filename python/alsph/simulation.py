@@ -157,6 +157,14 @@ class Simulation:
         """
         return self._engine.snapshot()
 
+    def breakdown(self) -> list[tuple[float, dict[str, NDArray[Any]]]]:
+        """Return time and particles, as :meth:`snapshot` does, before and after the step that broke down.
+
+        Those after it are at the positions before it. If no step has broken down, the present ones are all.
+        """
+        before, after = self.snapshot(), self._engine.failed_snapshot()
+        return [(self.time, before)] + ([] if after is None else [(math.nextafter(self.time, math.inf), after)])
+
     def history(self) -> dict[str, NDArray[Any]]:
         """Return one row for each step taken so far.
 
@@ -171,11 +179,14 @@ class Simulation:
         self._history = [{name: np.concatenate([rows[name] for rows in self._history]) for name in self._history[0]}]
         return self._history[0]
 
-    def new_history(self) -> dict[str, NDArray[Any]]:
-        """Return the rows of the history since the last call of this method or of :meth:`history`."""
+    def new_history(self, *, keep: bool = True) -> dict[str, NDArray[Any]]:
+        """Return the rows of the history since the last call of this method or of :meth:`history`.
+
+        Unless they are to be kept for :meth:`history`, which takes memory as long as the simulation lives.
+        """
         rows = self._engine.take_history()
         rows = {"step": rows["step"], **rows, **self._coefficients(rows)}
-        if len(rows["step"]):
+        if keep and len(rows["step"]):
             self._history.append(rows)
         return rows
 
@@ -237,8 +248,10 @@ class Simulation:
 
 
 def next_multiple(time: float, interval: float) -> float:
-    """Return the smallest multiple of `interval` after `time`."""
-    return (math.floor(time / interval + 1e-9) + 1) * interval
+    """Return the smallest multiple of `interval` after `time`, the same one for each time up to it, to the last bit."""
+    count = math.floor(min(time / interval, 1e300))
+    multiples = ((count + k) * interval for k in range(3))
+    return next((multiple for multiple in multiples if multiple > time), math.nextafter(time, math.inf))
 
 
 def _slices(wall_seconds: float) -> Iterator[float]:

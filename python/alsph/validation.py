@@ -1,6 +1,5 @@
 """Validation: cases at several resolutions, judged by their measures, and the report on it."""
 
-import contextlib
 import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,12 +12,12 @@ from rich.console import Console
 
 from alsph import analysis, cases, plotting
 from alsph.config import Config, RunSettings
-from alsph.errors import ConfigError, RunFolderError, SolverError
-from alsph.io import RunFolder
+from alsph.errors import ConfigError, SolverError
 from alsph.measures import Measure
 from alsph.progress import duration
 from alsph.results import Run
-from alsph.run import resume, start
+from alsph.run import Control, complete
+from alsph.tables import markdown
 
 HEADER = "case parameters resolution quantity value reference error tolerance order result".split()
 SNAPSHOTS = 10
@@ -158,7 +157,7 @@ class Report:
 
     def __str__(self) -> str:
         """Return the table and the verdict."""
-        return f"{_table(HEADER, [row.cells for row in self.rows])}\n\n{self.verdict}"
+        return f"{markdown(HEADER, [row.cells for row in self.rows])}\n\n{self.verdict}"
 
     def to_markdown(self) -> str:
         """Return the report as Markdown; the pictures are taken from files beside it."""
@@ -177,9 +176,9 @@ class Report:
                 self.verdict,
                 "The finest resolution of a case is judged; the order is the one observed from the next coarser one. "
                 "Errors are relative, those of a zero reference absolute.",
-                _table([*HEADER, "source"], [(*row.cells, row.measure.source) for row in self.rows]),
+                markdown([*HEADER, "source"], [(*row.cells, row.measure.source) for row in self.rows]),
                 *(f"![{title}]({file})" for file, title in self.figures.items()),
-                _table(["run", "status", "time", "alsph"], facts) + "\n",
+                markdown(["run", "status", "time", "alsph"], facts) + "\n",
             ]
         )
 
@@ -236,7 +235,7 @@ def validate(
             heading.print(config)
             folder = report.path / f"{entry.file_name}_resolution_{config.case.resolution}"
             try:
-                runs.append(_run(config, folder, progress))
+                runs.append(complete(config, folder, Control(progress=progress)))
             except SolverError as error:
                 report.rows.append(Row(entry, config.case.resolution, _broken_down(Run(folder), config, error)))
             report.runs.append(Run(folder))
@@ -258,21 +257,6 @@ def _chosen(names: Sequence[str], full: bool, suite: Sequence[Entry] | None) -> 
     return [entry for entry in suite if not names or entry.case in names]
 
 
-def _run(config: Config, path: Path, progress: bool) -> Run:
-    """Return the finished run of that case in a folder: as it is there, resumed, or run from the start."""
-    if (path / "case.toml").exists():
-        folder = RunFolder(path)
-        kept = folder.config()
-        if (kept.case, kept.until) == (config.case, config.until):
-            if not (path / "run.json").exists():  # cut before its first step
-                folder.write_info({})
-            if (run := Run(path)).status == "finished":
-                return run
-            with contextlib.suppress(RunFolderError):  # cut before its first checkpoint
-                return resume(path, threads=config.run.threads, progress=progress)
-    return start(config, path, force=True, progress=progress)
-
-
 class _Heading:
     """Announces each run, with the time that it and those after it will take by the pace of those before.
 
@@ -285,20 +269,13 @@ class _Heading:
     def __init__(self, configs: list[Config], *, enabled: bool) -> None:
         self.seconds: list[float] = []
         self._console = Console(highlight=False, quiet=not enabled)
-        self._work = [_work(config) for config in configs]
+        self._work = [config.work for config in configs]
 
     def print(self, config: Config) -> None:
         done, count = sum(self._work[: len(self.seconds)]), len(self._work)
         left = f"; ETA of all {duration(sum(self.seconds) / done * (sum(self._work) - done))}" if done else ""
         line = f"run {len(self.seconds) + 1} of {count}: {config.case.name}, resolution {config.case.resolution}{left}"
         self._console.print(line, markup=False, soft_wrap=True)
-
-
-def _work(config: Config) -> float:
-    """Pairs of particles times steps, up to a factor: what the time that a run takes is proportional to."""
-    case = config.case
-    neighbours = case.support_layers**case.space_dimensions
-    return float(case.particle_estimate() * neighbours * config.until * case.resolution)
 
 
 def _broken_down(run: Run, config: Config, error: SolverError) -> Measure:
@@ -343,11 +320,3 @@ def _draw(entry: Entry, runs: list[Run], rows: list[Row], path: Path) -> dict[st
         figure.savefig(path / f"{entry.file_name}_{name}.png")
         titles[f"{entry.file_name}_{name}.png"] = ", ".join([entry.case, *entry.settings, name.replace("_", " ")])
     return titles
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table whose columns are aligned in plain text too."""
-    lines = [[cell.replace("|", r"\|") for cell in cells] for cells in (header, *rows)]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    lines.insert(1, ["-" * width for width in widths])
-    return "\n".join("| " + " | ".join(map(str.ljust, cells, widths)) + " |" for cells in lines)

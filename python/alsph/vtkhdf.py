@@ -1,7 +1,7 @@
 """Particles over time as one temporal VTKHDF PolyData file, which ParaView opens (VTKHDF format 2.0).
 
 Every output appends one part: its points, one vertex cell a point, and the point data. What is valid is what the
-attribute ``NSteps`` counts, and it is written last, so that an append that was cut short is overwritten by the next.
+attribute ``NSteps`` counts.
 """
 
 from pathlib import Path
@@ -10,6 +10,9 @@ from typing import Any
 import h5py
 import numpy as np
 from numpy.typing import NDArray
+
+from alsph.durable import growing
+from alsph.reading import sound
 
 TOPOLOGIES = ("Vertices", "Lines", "Polygons", "Strips")
 FIELDS: dict[str, type[np.generic]] = {
@@ -39,18 +42,19 @@ def append(path: Path, time: float, particles: dict[str, NDArray[Any]]) -> None:
     columns = {name: np.asarray(particles[name], dtype) for name, dtype in FIELDS.items()}
     columns["velocity"] = _three_components(columns["velocity"])
     points = _three_components(np.asarray(particles["position"], np.float32))
-    with h5py.File(path, "a", locking=False) as file:
+    with growing(path) as file:
         root = file["VTKHDF"] if "VTKHDF" in file else _create(file, points, columns)
         _append_part(root, time, points, columns)
 
 
 def truncate(path: Path, time: float) -> None:
     """Drop the outputs later than `time`."""
-    with h5py.File(path, "r+", locking=False) as file:
+    with growing(path) as file:
         steps = file["VTKHDF/Steps"]
-        keep = int(np.searchsorted(steps["Values"][: steps.attrs["NSteps"]], time, side="right"))
+        values = sound(steps, "Values")
+        keep = int(np.searchsorted(values[: steps.attrs["NSteps"]], time, side="right"))
         steps.attrs["NSteps"] = keep
-        steps["Values"].resize(keep, axis=0)
+        values.resize(keep, axis=0)
 
 
 def _create(file: h5py.File, points: NDArray[Any], columns: dict[str, NDArray[Any]]) -> h5py.Group:

@@ -67,21 +67,21 @@ impl<const D: usize> Walls<D> {
         frame.images.vectors(&mut self.viscous_velocity);
     }
 
-    /// Set [`Walls::dispersion`] to `factor` ∇²u, `laplacian` being that of the real particles. The compact Laplacian of a wave is too
+    /// Set [`Walls::dispersion`] to `factor` ∇²u of the real particles. The compact Laplacian of a wave is too
     /// small by `factor` k² of it; that of u − dispersion is right to fourth order.
     pub fn sharpen(
         &mut self,
         settings: &Settings,
         particles: &Particles<D>,
         frame: &Frame<D>,
-        laplacian: &[Vector<D>],
+        laplacian: impl Fn(usize) -> Vector<D> + Sync,
         factor: f64,
     ) {
         let Particles { real, kind, .. } = particles;
         let dispersion = &mut self.dispersion;
         dispersion.resize(particles.len(), Vector::zeros());
         parallel::for_each(&mut dispersion[..*real], |i, out| {
-            *out = if kind[i] == ParticleKind::Fluid { laplacian[i] * factor } else { Vector::zeros() };
+            *out = if kind[i] == ParticleKind::Fluid { laplacian(i) * factor } else { Vector::zeros() };
         });
         let solids = continued(settings, particles, &frame.stencil, dispersion, |_| Vector::zeros(), |n| [1.0, n]);
         solids.into_iter().for_each(|(s, value)| dispersion[s] = value);

@@ -2,7 +2,7 @@
 
 use crate::boundary::{Walls, deep_in_inlet, extrapolate};
 use crate::frame::Frame;
-use crate::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, vector_laplacian};
+use crate::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, vector_laplacian};
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::scheme::projection::Projection;
@@ -27,9 +27,9 @@ pub struct Alsph<const D: usize> {
     pub position_initial: Vec<Vector<D>>,
     pub velocity_initial: Vec<Vector<D>>,
     pub pressure_initial: Vec<f64>,
-    /// ∇·u^m and p^m side by side, because (8) and (10) read them together.
+    /// ∇·u^m less [`Derived::solenoidal`], and p^m side by side, because (8) and (10) read them together.
     divergence_pressure: Vec<[f64; 2]>,
-    velocity_laplacian: Vec<Vector<D>>,
+    derived: Vec<Derived<D>>,
     /// What makes it of fourth order, once a step: minus the Laplacian of [`Walls::dispersion`]. Empty at second order.
     sharpening: Vec<Vector<D>>,
     /// u*.
@@ -38,6 +38,16 @@ pub struct Alsph<const D: usize> {
     /// ∇p^m near solids, where the pressure is continued into them.
     pressure_gradient: Vec<Vector<D>>,
     projection: Projection,
+}
+
+/// What the velocity of a real particle gives beside ∇·u^m.
+#[derive(Clone, Copy, Debug)]
+pub struct Derived<const D: usize> {
+    /// ∇²u^m.
+    pub laplacian: Vector<D>,
+    /// The ∇·u that a solenoidal u^{n+1} has in the frame of the derivatives: in the middle of the step, half a step before r^{n+1},
+    /// it is ½Δt tr (∇u)². Zero in the paper's algorithms.
+    pub solenoidal: f64,
 }
 
 /// What stays the same during one step.
@@ -56,7 +66,7 @@ pub struct Step<'a> {
 
 impl<const D: usize> Alsph<D> {
     /// Advance velocity and pressure to n+1 and leave `particles.position` at the frame of the last derivatives; see
-    /// [`Alsph::advance_positions`]. `frame` holds the stencil at r^n.
+    /// [`Alsph::advance_positions`]. `frame` holds the stencil at r^n, or in the middle of the step.
     pub fn iterate(
         &mut self,
         step: Step,
@@ -64,7 +74,7 @@ impl<const D: usize> Alsph<D> {
         frame: &mut Frame<D>,
         walls: &mut Walls<D>,
     ) -> Outcome {
-        self.begin(particles);
+        self.begin(particles, frame);
         self.velocity_derivatives(step, particles, frame, walls);
         self.sharpen_laplacian(step, particles, frame, walls);
         for iteration in 1.. {
@@ -72,7 +82,7 @@ impl<const D: usize> Alsph<D> {
             self.update_pressure(step, particles, frame); // (10) (20)
             self.correct_velocity(step, particles, frame); // (11)
             if iteration == step.settings.max_iterations {
-                self.projection.sweep(step, particles, frame);
+                self.projection.sweep(step, particles, frame, &self.derived);
             }
             if step.settings.derivative_frame == DerivativeFrame::Updated {
                 self.advance_positions(step, particles, frame); // (12): Algorithm 1 takes its derivatives at r^{n+1,m}
@@ -89,17 +99,18 @@ impl<const D: usize> Alsph<D> {
     }
 
     /// ∇·u of the last iteration.
-    pub fn divergence(&self, i: usize) -> f64 {
+    fn divergence(&self, i: usize) -> f64 {
         self.divergence_pressure[i][0]
     }
 
-    fn begin(&mut self, particles: &Particles<D>) {
+    fn begin(&mut self, particles: &Particles<D>, frame: &Frame<D>) {
         let (real, count) = (particles.real, particles.len());
-        copy(&particles.position[..real], &mut self.position_initial);
+        let start = if frame.start.is_empty() { &particles.position[..real] } else { &frame.start[..] };
+        copy(start, &mut self.position_initial);
         copy(&particles.velocity[..real], &mut self.velocity_initial);
         copy(&particles.pressure[..real], &mut self.pressure_initial);
         self.divergence_pressure.resize(count, [0.0; 2]);
-        self.velocity_laplacian.resize(real, Vector::zeros());
+        self.derived.resize(real, Derived { laplacian: Vector::zeros(), solenoidal: 0.0 });
         self.velocity_star.resize(count, Vector::zeros());
         self.pressure_laplacian.resize(real, 0.0);
         self.pressure_gradient.resize(count, Vector::zeros());
@@ -112,18 +123,20 @@ impl<const D: usize> Alsph<D> {
         let (velocity, pressure) = (&particles.velocity, &particles.pressure);
         let walls = &*walls;
         let seen = |s, i| walls.seen_by(particles, s, i);
+        let lead = step.settings.derivative_frame.fraction() * step.time_step;
         frame.stencil.correct_and_for_each(
-            LaplacianAndDivergence { velocity, seen },
+            LaplacianAndGradient { velocity, seen },
             &mut self.divergence_pressure[..real],
-            &mut self.velocity_laplacian,
-            |i, (component_form, divergence), out, laplacian| {
-                *out = [divergence, pressure[i]];
-                *laplacian = component_form;
+            &mut self.derived,
+            |i, (laplacian, gradient), out, derived| {
+                let solenoidal = if lead > 0.0 { lead * (gradient * gradient).trace() } else { 0.0 };
+                *out = [gradient.trace() - solenoidal, pressure[i]];
+                *derived = Derived { laplacian, solenoidal };
             },
         );
         if step.settings.velocity_laplacian == VelocityLaplacian::Vector {
-            parallel::for_each(&mut self.velocity_laplacian, |i, laplacian| {
-                *laplacian = vector_laplacian(&frame.stencil, velocity, i, |s| seen(s, i));
+            parallel::for_each(&mut self.derived, |i, derived| {
+                derived.laplacian = vector_laplacian(&frame.stencil, velocity, i, |s| seen(s, i));
             });
         }
         frame.images.scalars(&mut self.divergence_pressure);
@@ -134,12 +147,12 @@ impl<const D: usize> Alsph<D> {
         if step.settings.viscous_order < 4 {
             return;
         }
-        walls.sharpen(step.settings, particles, frame, &self.velocity_laplacian, step.dispersion);
+        walls.sharpen(step.settings, particles, frame, |i| self.derived[i].laplacian, step.dispersion);
         let dispersion = &walls.dispersion;
         let count = particles.real;
         self.sharpening.resize(count, Vector::zeros());
         frame.stencil.for_each_one(
-            LaplacianAndDivergence { velocity: dispersion, seen: |s: usize, _: usize| dispersion[s] },
+            LaplacianAndGradient { velocity: dispersion, seen: |s: usize, _: usize| dispersion[s] },
             &mut self.sharpening,
             |_, (laplacian, _), out| *out = -laplacian,
         );
@@ -151,7 +164,7 @@ impl<const D: usize> Alsph<D> {
         let gravity = Vector::<D>::from_column_slice(&step.settings.body_force);
         let (dt, viscosity) = (step.time_step, step.settings.kinematic_viscosity);
         let paper_walls = step.settings.wall_pressure == WallPressure::Paper;
-        let (initial, laplacian) = (&self.velocity_initial, &self.velocity_laplacian);
+        let (initial, derived) = (&self.velocity_initial, &self.derived);
         let sharpening = |i: usize| self.sharpening.get(i).copied().unwrap_or_else(Vector::zeros);
         frame.stencil.for_each(
             GradientAndLaplacian(&self.divergence_pressure),
@@ -167,7 +180,7 @@ impl<const D: usize> Alsph<D> {
                 *star = if still {
                     initial[i]
                 } else {
-                    initial[i] + (penalty * step.penalty + (laplacian[i] + sharpening(i)) * viscosity + gravity) * dt
+                    initial[i] + (penalty * step.penalty + (derived[i].laplacian + sharpening(i)) * viscosity + gravity) * dt
                 };
             },
         );
@@ -186,10 +199,11 @@ impl<const D: usize> Alsph<D> {
         let Step { settings, time_step: dt, penalty, .. } = step;
         let paper_walls = settings.wall_pressure == WallPressure::Paper;
         let (star, initial, laplacian) = (&self.velocity_star, &self.velocity_initial, &self.pressure_laplacian);
+        let derived = &self.derived;
         let (position, deep_in_inlet) = (&*position, deep_in_inlet(settings));
         frame.stencil.for_each_one(Divergence(star), &mut pressure[..*real], |i, divergence, p| {
             let solid = kind[i] == ParticleKind::Solid;
-            let divergence = if deep_in_inlet(kind[i], &position[i]) { 0.0 } else { divergence };
+            let divergence = if deep_in_inlet(kind[i], &position[i]) { 0.0 } else { divergence - derived[i].solenoidal };
             if kind[i] == ParticleKind::Outlet {
                 *p = 0.0;
             } else if !solid || paper_walls {

@@ -3,5 +3,5 @@
 mod alsph;
 mod projection;
 
-pub use alsph::{Alsph, Outcome, Step};
+pub use alsph::{Alsph, Derived, Outcome, Step};
 pub use projection::relaxation;

@@ -15,7 +15,7 @@ use crate::boundary::{deep_in_inlet, extrapolate};
 use crate::frame::Frame;
 use crate::operators::{Divergence, Gradient};
 use crate::particles::{ParticleKind, Particles};
-use crate::scheme::Step;
+use crate::scheme::{Derived, Step};
 use crate::settings::Settings;
 
 /// κ: the share of a sweep's potential that the pressure keeps. The rest of it is mostly noise of the one step; all of the
@@ -37,8 +37,14 @@ pub struct Projection {
 }
 
 impl Projection {
-    /// All sweeps of one step.
-    pub fn sweep<const D: usize>(&mut self, step: Step, particles: &mut Particles<D>, frame: &Frame<D>) {
+    /// All sweeps of one step. They take off what ∇·u has beyond [`Derived::solenoidal`].
+    pub fn sweep<const D: usize>(
+        &mut self,
+        step: Step,
+        particles: &mut Particles<D>,
+        frame: &Frame<D>,
+        derived: &[Derived<D>],
+    ) {
         let Step { settings, time_step, relaxation, .. } = step;
         let Particles { real, kind, position, pressure, velocity, .. } = particles;
         let (kind, position) = (&kind[..*real], &*position);
@@ -49,7 +55,7 @@ impl Projection {
         for _ in 0..settings.projection_sweeps {
             frame.stencil.for_each_one(Divergence(velocity), &mut divergence[..*real], |i, value, out| {
                 let none = kind[i] == ParticleKind::Outlet || deep_in_inlet(kind[i], &position[i]);
-                *out = if none { 0.0 } else { value };
+                *out = if none { 0.0 } else { value - derived[i].solenoidal };
             });
             extrapolate(settings, &frame.stencil, kind, divergence, |divergence, j, _| divergence[j]);
             frame.images.scalars(divergence);

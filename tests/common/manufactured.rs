@@ -1,7 +1,7 @@
 //! A smooth periodic field with known derivatives, and the errors of the operators applied to it.
 
 use super::set::Set;
-use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndDivergence, vector_laplacian};
+use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, vector_laplacian};
 use alsph::{Matrix, Vector};
 use std::f64::consts::TAU;
 
@@ -100,5 +100,5 @@ impl OperatorErrors {
 /// ∇²x = −K Σ slope r_ij, which an exact operator would give as zero: times ∇f the error of ∇²f for a linear f.
 pub fn laplacian_of_positions<const D: usize>(set: &Set<D>) -> Vec<Vector<D>> {
     let velocity = &set.particles.position;
-    set.apply(LaplacianAndDivergence { velocity, seen: |s, _| velocity[s] }).into_iter().map(|value| value.0).collect()
+    set.apply(LaplacianAndGradient { velocity, seen: |s, _| velocity[s] }).into_iter().map(|value| value.0).collect()
 }

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 SUPPORT = {"quintic_spline": 3, "wendland_c2": 2, "wendland_c4": 2}
 """Support radius of each kernel in smoothing lengths."""
 
+VELOCITY_LIMIT = 50.0
+"""Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
+
 
 class Case(Parameters):
     """A flow problem with its numerical parameters.
@@ -45,16 +48,22 @@ class Case(Parameters):
     adaptive_time_step: bool = Field(
         default=True, description="take a smaller time step where the stability law asks for it"
     )
+    adaptive_until: float | None = Field(
+        default=None,
+        gt=0,
+        description="time from which on every step is time_step all the same; never if not given [D/U]",
+    )
     time_step_safety: float = Field(
         default=0.9, gt=0, le=1, description="fraction of the stability law's time step taken [-]"
     )
-    algorithm: Literal[1, 2, "original"] = Field(
-        default=2,
-        description="derivatives at updated positions (1), initial positions (2), or 1 with a search every iteration",
+    algorithm: Literal["midpoint", 1, 2, "original"] = Field(
+        default="midpoint",
+        description="derivatives in the middle of the step, of second order in time; the paper's at updated (1) or "
+        "initial positions (2); or 1 with a search in every iteration",
     )
-    max_iterations: int = Field(default=2, ge=1, description="cap of the inner iterations of a step [-]")
+    max_iterations: int = Field(default=2, ge=1, le=1000, description="cap of the inner iterations of a step [-]")
     projection_sweeps: int = Field(
-        default=4, ge=0, description="projection sweeps after the iterations of a step, 0 in the paper [-]"
+        default=4, ge=0, le=1000, description="projection sweeps after the iterations of a step, 0 in the paper [-]"
     )
     tolerance: float = Field(default=1e-3, gt=0, description="largest |∇·u| at which the iterations end, ε [U/D]")
     penalty_constant: float = Field(default=100.0, ge=1, le=100, description="penalty constant C_BV = (c/u_max)² [-]")
@@ -164,18 +173,19 @@ class Case(Parameters):
     def settings(self) -> dict[str, Any]:
         """Return the engine's settings (see docs/architecture.md)."""
         shared = (
-            "smoothing_ratio kernel adaptive_time_step time_step_safety max_iterations projection_sweeps "
-            "penalty_constant velocity_laplacian laplacian_correction viscous_order shifting shift_coefficient "
-            "shift_limit wall_velocity wall_pressure"
+            "smoothing_ratio kernel adaptive_time_step adaptive_until time_step_safety max_iterations "
+            "projection_sweeps penalty_constant velocity_laplacian laplacian_correction viscous_order shifting "
+            "shift_coefficient shift_limit wall_velocity wall_pressure"
         )
         return {name: getattr(self, name) for name in shared.split()} | {
             "dimensions": self.space_dimensions,
+            "velocity_limit": VELOCITY_LIMIT,
             "particle_spacing": self.particle_spacing,
             "density": 1.0,
             "kinematic_viscosity": self.kinematic_viscosity,
             "body_force": self.body_force(),
             "time_step": self.time_step * self.particle_spacing,
-            "derivative_frame": "initial" if self.algorithm == 2 else "updated",
+            "derivative_frame": {2: "initial", "midpoint": "midpoint"}.get(self.algorithm, "updated"),
             "search_every_iteration": self.algorithm == "original",
             "divergence_tolerance": self.tolerance,
             "domain": self.domain(),
@@ -225,6 +235,8 @@ class Case(Parameters):
         *,
         force: bool = False,
         progress: bool = True,
+        walltime: float = math.inf,
+        retry: int = 0,
         **settings: Any,
     ) -> Run:
         """Run the case to `until`, write a run folder, and return its results.
@@ -241,6 +253,10 @@ class Case(Parameters):
             Replace an existing run folder.
         progress
             Report progress.
+        walltime
+            Seconds after which the run writes a checkpoint and ends with a :class:`alsph.errors.WalltimeError`.
+        retry
+            How often a run that breaks down goes back to a checkpoint and on with half the time step.
         **settings
             Further settings of :class:`alsph.config.RunSettings`, such as ``output_interval``.
 
@@ -249,15 +265,17 @@ class Case(Parameters):
         ConfigError, RunFolderError
             Before anything is written.
         SolverError
-            If the computation breaks down; the folder keeps the last checkpoint.
-        KeyboardInterrupt
-            At Ctrl-C, after a checkpoint has been written.
+            If the computation breaks down; the folder keeps the last checkpoint and the particles of the failed step.
+        WalltimeError
+            When the wall time is used up, after a checkpoint has been written.
+        Interrupted
+            At Ctrl-C or SIGTERM, a ``KeyboardInterrupt``, after a checkpoint has been written.
         """
         from alsph.config import Config, RunSettings
-        from alsph.run import start
+        from alsph.run import Control, start
 
         config = Config(self, RunSettings(until=until, threads=threads, **settings))
-        return start(config, Path(folder), force=force, progress=progress)
+        return start(config, Path(folder), Control(progress, walltime=walltime, retry=retry), force=force)
 
     def memory(self) -> float:
         """Return the estimated peak memory of a simulation [bytes]."""
@@ -280,7 +298,7 @@ class Case(Parameters):
             return None
         remedy = (
             "adaptive_time_step takes smaller steps"
-            if self.adaptive_time_step
+            if self.adaptive_time_step and self.adaptive_until is None
             else "expect divergence: lower time_step or switch adaptive_time_step on"
         )
         return (

@@ -1,0 +1,211 @@
+"""Files that nothing leaves half-written, be it a killed process, a full disk or a power cut.
+
+A file is either replaced as a whole (:func:`replacing`) or, if it is an HDF5 file, grown in one stroke
+(:func:`growing`): what is new is written behind its end, and the few pages in its midst that must change are first
+written to a journal beside it, from which a change that was cut is completed.
+"""
+
+import hashlib
+import io
+import os
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+PAGE = 4096
+MAGIC = b"alsph journal 1\n"
+
+
+@contextmanager
+def replacing(path: Path, keep: Path | None = None) -> Iterator[Path]:
+    """Give a temporary path and, once its file is safe on the disk, rename it to `path`; `keep` gets what was there."""
+    temporary = path.with_name(f".{path.name}.new")
+    temporary.unlink(missing_ok=True)
+    try:
+        yield temporary
+        flush(temporary)
+        if keep and path.exists():
+            path.replace(keep)
+        temporary.replace(path)
+        flush(path.parent)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def flush(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk."""
+    if os.name != "posix" and path.is_dir():
+        return
+    descriptor = os.open(path, os.O_RDONLY if os.name == "posix" else os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def growing(path: Path) -> Iterator[h5py.File]:
+    """Open an HDF5 file to be changed or, if there is none, made: all of the change takes place, or nothing of it.
+
+    The HDF5 library works in memory: it does not bear a disk that fails.
+    """
+    recover(path)
+    if not path.exists():
+        content = io.BytesIO()
+        with h5py.File(content, "w") as file:
+            yield file
+        with replacing(path) as temporary:
+            temporary.write_bytes(content.getbuffer())
+        return
+    with _Overlay(path) as overlay:
+        with h5py.File(overlay, "r+") as file:
+            yield file
+        overlay.commit()
+
+
+def recover(path: Path) -> None:
+    """Complete a change of a file that was cut in the midst of it."""
+    journal = _journal(path)
+    if not journal.exists():
+        return
+    content = journal.read_bytes()
+    head = len(MAGIC) + 32
+    body = content[head:]
+    # A journal is complete, being renamed when it is on the disk, before the first page changes.
+    if path.exists() and content.startswith(MAGIC) and hashlib.sha256(body).digest() == content[len(MAGIC) : head]:
+        with suppress(struct.error, ValueError, OverflowError):  # a journal that others made
+            _apply(path, body)
+    journal.unlink()
+
+
+def _journal(path: Path) -> Path:
+    return path.with_name(f".{path.name}.journal")
+
+
+def _apply(path: Path, body: bytes) -> None:
+    """Write the pages in a journal into their file, and cut it to its new size; to do so twice does no harm."""
+    (size,) = struct.unpack_from("<Q", body)
+    with path.open("r+b") as file:
+        place = 8
+        while place < len(body):
+            offset, length = struct.unpack_from("<QQ", body, place)
+            place += 16
+            file.seek(offset)
+            file.write(body[place : place + length])
+            place += length
+        file.truncate(size)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+class _Overlay(io.RawIOBase):
+    """A file whose changes are held in memory until :meth:`commit`."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self._path = path
+        self._file = path.open("r+b", buffering=0)
+        self._old = os.fstat(self._file.fileno()).st_size
+        self._pages: dict[int, bytearray] = {}
+        self._tail = bytearray()
+        self._end = self._old
+        self._place = 0
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        base = {os.SEEK_SET: 0, os.SEEK_CUR: self._place, os.SEEK_END: self._end}[whence]
+        self._place = base + offset
+        return self._place
+
+    def tell(self) -> int:
+        return self._place
+
+    def readable(self) -> bool:
+        return True
+
+    def writable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        view = memoryview(buffer).cast("B")
+        start, end = self._place, max(min(self._place + len(view), self._end), self._place)
+        self._file.seek(start)
+        read = 0
+        while start + read < min(end, self._old) and (part := self._file.readinto(view[read : self._old - start])):
+            read += part
+        for offset, first, last in self._touched(start, end):
+            if offset in self._pages:
+                view[first - start : last - start] = self._pages[offset][first - offset : last - offset]
+        if end > self._old:
+            first = max(start, self._old)
+            view[first - start : end - start] = self._tail[first - self._old : end - self._old]
+        self._place = end
+        return end - start
+
+    def write(self, data: Any) -> int:
+        view = memoryview(data).cast("B")
+        start, end = self._place, self._place + len(view)
+        if end > self._end:
+            self.truncate(end)
+        for offset, first, last in self._touched(start, end):
+            self._page(offset)[first - offset : last - offset] = view[first - start : last - start]
+        if end > self._old:
+            first = max(start, self._old)
+            self._tail[first - self._old : end - self._old] = view[first - start :]
+        self._place = end
+        return len(view)
+
+    def _touched(self, start: int, end: int) -> Iterator[tuple[int, int, int]]:
+        """Yield the offset of each page that lay in the file and meets `start` to `end`, and where they overlap."""
+        end = min(end, self._old)
+        for offset in range(start - start % PAGE, end, PAGE):
+            first, last = max(start, offset), min(end, offset + PAGE)
+            if first < last:
+                yield offset, first, last
+
+    def _page(self, offset: int) -> bytearray:
+        if offset not in self._pages:
+            self._file.seek(offset)
+            self._pages[offset] = bytearray(self._file.read(min(PAGE, self._old - offset)))
+        return self._pages[offset]
+
+    def truncate(self, size: int | None = None) -> int:
+        self._end = self._place if size is None else size
+        length = max(self._end - self._old, 0)
+        self._tail = self._tail[:length].ljust(length, b"\0")
+        return self._end
+
+    def commit(self) -> None:
+        """Let all that was written take place.
+
+        Raises
+        ------
+        OSError
+            If the disk fails; the file is as it was, or becomes so by :func:`recover`.
+        """
+        try:
+            self._file.seek(self._old)
+            written = 0
+            while written < len(self._tail):
+                written += self._file.write(memoryview(self._tail)[written:]) or 0
+            os.fsync(self._file.fileno())
+            pages = (struct.pack("<QQ", offset, len(page)) + page for offset, page in sorted(self._pages.items()))
+            body = struct.pack("<Q", self._end) + b"".join(pages)
+            with replacing(_journal(self._path)) as temporary:
+                temporary.write_bytes(MAGIC + hashlib.sha256(body).digest() + body)
+        except OSError:
+            _journal(self._path).unlink(missing_ok=True)
+            self._file.truncate(self._old)
+            raise
+        _apply(self._path, body)
+        _journal(self._path).unlink()
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()

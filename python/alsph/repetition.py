@@ -1,0 +1,121 @@
+"""Repeating a run: the same steps again, compared with what its folder holds."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from alsph import checkpoint, config
+from alsph.config import Config
+from alsph.errors import ConfigError, RunFolderError
+from alsph.io import RunFolder, history_lines
+from alsph.progress import Reporter
+from alsph.provenance import provenance
+from alsph.simulation import SLICE_SECONDS, Simulation
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """How a run compares with its repetition.
+
+    Attributes
+    ----------
+    steps : int
+        Steps repeated.
+    same_state : bool
+        Whether the state at the end is the same to the last bit.
+    first_difference : str
+        Where the history differs first, empty where it does not.
+    environment : list of str
+        What is not as it was when the run was made.
+    """
+
+    steps: int
+    same_state: bool
+    first_difference: str
+    environment: list[str]
+
+    @property
+    def same(self) -> bool:
+        """Whether state and history are the same."""
+        return self.same_state and not self.first_difference
+
+    def __str__(self) -> str:
+        """Tell the result in a line or a few."""
+        verdict = "the same to the last bit" if self.same else "not the same"
+        lines = [f"{self.steps} steps repeated: {verdict}"]
+        if not self.same:
+            lines += [self.first_difference or "the history is the same, the state at its end is not"]
+        return "\n".join(lines + [f"unlike the run: {fact}" for fact in self.environment])
+
+
+def repeat(path: str | Path, threads: int | None = None, *, progress: bool = True) -> Repetition:
+    """Repeat a run from its start to its last checkpoint, and compare history and state; nothing is written.
+
+    Parameters
+    ----------
+    path
+        The run folder.
+    threads
+        Number of threads; the run's own if None.
+    progress
+        Report progress.
+
+    Raises
+    ------
+    RunFolderError
+        If the folder does not hold what a repetition needs.
+    SolverError
+        If the computation breaks down, which it did not in the run.
+    """
+    folder = RunFolder(Path(path))
+    info, settings = folder.info(), folder.config().run
+    if not info.get("segments") or not info.get("checkpoint"):
+        raise RunFolderError(f"{path}/run.json does not tell with what steps the run was made; it is of an older alsph")
+    threads = threads or settings.threads
+    parts = [(int(part["step"]), _case(part["case"], settings, folder)) for part in info["segments"]]
+    if parts[0][0] != 0:
+        raise RunFolderError(f"{path}/run.json knows the run from step {parts[0][0]} on only; it cannot be repeated")
+    simulation = parts[0][1].case.simulation(threads)
+    bodies = [body["name"] for body in simulation.problem.settings["bodies"]]
+    recorded = folder.path / "history.csv"
+    difference, until = "", parts[-1][1].until
+    with recorded.open(encoding="utf-8") as file, Reporter(until, 0.0, enabled=progress) as reporter:
+        names = next(file, "").rstrip().split(",")
+        ends = [*(step for step, _ in parts[1:]), int(info["checkpoint"]["step"])]
+        for (_, part), end in zip(parts, ends, strict=True):
+            if simulation.step:
+                simulation = Simulation(part.case.problem(simulation.state()), threads)
+            while simulation.step < end and not difference:
+                simulation.advance(end - simulation.step, SLICE_SECONDS)
+                rows = simulation.new_history(keep=False)
+                reporter.update(rows)
+                for line in history_lines(rows, bodies):
+                    difference = difference or _difference(names, next(file, ""), line)
+    now, then = provenance(simulation.threads), info
+    facts = ("versions", "commit", "instructions", "threads")
+    return Repetition(
+        steps=simulation.step,
+        same_state=checkpoint.digest(simulation.state()) == info["checkpoint"]["state_sha256"],
+        first_difference=difference,
+        environment=[f"{name}: {now[name]}, was {then.get(name)}" for name in facts if now[name] != then.get(name)],
+    )
+
+
+def _case(tables: Any, settings: config.RunSettings, folder: RunFolder) -> Config:
+    try:
+        return Config(config.from_tables(tables).case, settings)
+    except (ConfigError, TypeError) as error:
+        raise RunFolderError(f"{folder.path}/run.json: the case of a segment cannot be used: {error}") from None
+
+
+def _difference(names: list[str], then: str, now: list[str]) -> str:
+    """Say where a row of the history differs from the line that was recorded, or return nothing."""
+    was = then.rstrip("\n").split(",")
+    if was == now:
+        return ""
+    if len(was) != len(now):
+        return f"step {now[0]}: not in the recorded history"
+    index = next(k for k in range(len(now)) if was[k] != now[k])
+    change = abs(float(now[index]) - float(was[index])) if math.isfinite(float(was[index])) else math.nan
+    return f"step {now[0]}: {names[index]} is {now[index]}, was {was[index]} (by {change:.3g})"

@@ -1,0 +1,136 @@
+"""Progress of a study: a live table on a terminal, plain lines elsewhere; and the table of its state."""
+
+import time as clock
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from alsph.progress import duration
+from alsph.study.declaration import Point, Study
+from alsph.study.state import ENDED, State
+
+PLAIN_SECONDS = 60.0
+
+
+class Board:
+    """Reports a study to the user.
+
+    Parameters
+    ----------
+    study
+        The study.
+    points
+        Its runs.
+    output
+        Where it is.
+    enabled
+        Report at all.
+    """
+
+    def __init__(self, study: Study, points: Sequence[Point], output: Path, *, enabled: bool = True) -> None:
+        self.study, self.points, self.output = study, points, output
+        self.console = Console(highlight=False, quiet=not enabled, soft_wrap=True)
+        self.live = Live(console=self.console, auto_refresh=False) if enabled and self.console.is_terminal else None
+        self.first: dict[str, tuple[float, float]] = {}  # time reached and clock when a run was first seen to run
+        self.start_work: float | None = None
+        self.start = self.last_line = clock.monotonic()
+        self.labels = {point.name: point.label for point in points}
+
+    def __enter__(self) -> Self:
+        """Show the table."""
+        self.say(f"study {self.study.name}: {len(self.points)} runs in {self.output}")
+        if self.live:
+            self.live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop the table."""
+        if self.live:
+            self.live.stop()
+
+    def say(self, line: str) -> None:
+        """Print a line."""
+        self.console.print(line, markup=False)
+
+    def ended(self, name: str, how: str) -> None:
+        """Report the end of a run."""
+        self.say(f"{how}: {self.labels[name]}  ({name})")
+
+    def update(self, found: Mapping[str, State]) -> None:
+        """Report the states of the runs by name."""
+        now = clock.monotonic()
+        for name, state in found.items():
+            if state.status == "running":
+                self.first.setdefault(name, (state.time, now))
+        if self.live:
+            self.live.update(self._table(found, now), refresh=True)
+        elif now - self.last_line >= PLAIN_SECONDS:
+            self.last_line = now
+            for point in self.points:
+                if found[point.name].status == "running":
+                    self.say(f"  {self._line(point, found[point.name], now)}")
+            self.say(self._total(found, now))
+
+    def _table(self, found: Mapping[str, State], now: float) -> Table:
+        table = Table.grid(padding=(0, 2))
+        shown = self.points if len(self.points) <= self.console.height - 4 else self._lively(found)
+        for point in shown:
+            table.add_row(self._line(point, found[point.name], now))
+        table.add_row(self._total(found, now))
+        return table
+
+    def _lively(self, found: Mapping[str, State]) -> list[Point]:
+        """Return the runs that are going on or have failed, where the screen does not hold all."""
+        return [point for point in self.points if found[point.name].status in ("running", "failed")]
+
+    def _line(self, point: Point, state: State, now: float) -> str:
+        line = f"{state.status:8}  {point.label}"
+        if state.status == "running":
+            line += f"  t* {state.time:.2f} of {point.config.until:g}  ETA {self._left(point, state, now)}"
+        return f"{line}  {state.message}" if state.status == "failed" else line
+
+    def _left(self, point: Point, state: State, now: float) -> str:
+        time, seen = self.first.get(point.name, (state.time, now))
+        if state.time <= time:
+            return "?"
+        return duration((now - seen) * (point.config.until - state.time) / (state.time - time))
+
+    def _total(self, found: Mapping[str, State], now: float) -> str:
+        counts = Counter(found[point.name].status for point in self.points)
+        done, total = (sum(work) for work in zip(*(_work(p, found[p.name]) for p in self.points), strict=True))
+        if self.start_work is None:
+            self.start_work = done
+        ended = sum(counts[status] for status in ENDED)
+        line = f"{ended} of {len(self.points)} runs ended ({', '.join(f'{n} {name}' for name, n in counts.items())})"
+        if ended == len(self.points):
+            return line
+        pace = (done - self.start_work) / (now - self.start) if now > self.start else 0.0
+        left = duration((total - done) / pace) if pace > 0 else "?"
+        return f"{line}, {100 * done / total:.0f} % of the work, ETA of all {left}"
+
+
+def _work(point: Point, state: State) -> tuple[float, float]:
+    """Work done and to be done of a run, in pairs of particles."""
+    work = point.config.work
+    if state.status in ENDED:
+        return work, work
+    return work * min(state.time / point.config.until, 1.0), work
+
+
+def overview(points: Sequence[Point], found: Mapping[str, State]) -> list[str]:
+    """Return the state of a study: one line a run, and a total."""
+    lines = []
+    for point in points:
+        state = found[point.name]
+        reached = f"t* {state.time:.4g} of {point.config.until:g}, {duration(state.seconds)}" if state.seconds else ""
+        lines.append("  ".join(part for part in (f"{state.status:8}", point.label, reached, state.message) if part))
+    counts = Counter(found[point.name].status for point in points)
+    return [*lines, f"{len(points)} runs: " + ", ".join(f"{count} {status}" for status, count in counts.items())]

@@ -1,0 +1,306 @@
+"""What a study found: a row of results for each run, tables, and figures in the form that the study declares."""
+
+import csv
+import html
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure as Picture
+
+from alsph import plotting
+from alsph.analysis import Estimate
+from alsph.errors import AlsphError
+from alsph.measures import Profile
+from alsph.parameters import suggest
+from alsph.plotting import Curve
+from alsph.results import Run
+from alsph.study.declaration import Figure, Point, Study, text
+from alsph.study.state import ENDED, RUNS, State, states
+from alsph.tables import markdown
+
+DIVERGENCE = "mean velocity divergence, |∇·u| D/U"
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """The results of a study.
+
+    Attributes
+    ----------
+    study : Study
+    path : Path
+        Folder of the tables and figures.
+    rows : list of dict
+        For each run its swept parameters, ``status``, ``time`` reached, ``folder``, and the results by name, numbers
+        with their uncertainty where they have one (:class:`alsph.analysis.Estimate`).
+    references : list of dict
+        Reference values of the same results, where they are known.
+    states : list of State
+        How far each run is.
+    found : list of dict
+        All results of each run by name, collected in the rows or not.
+    """
+
+    study: Study
+    path: Path
+    rows: list[dict[str, Any]]
+    references: list[dict[str, float]]
+    states: list[State]
+    found: list[dict[str, Any]]
+
+    @classmethod
+    def of(
+        cls, study: Study, points: list[Point], output: Path, failures: Mapping[str, str] | None = None
+    ) -> "Results":
+        """Collect the results from the run folders in ``output/runs``; `failures` are messages by name of the run."""
+        found = states(points, output, failures)
+        reached = [found[point.name] for point in points]
+        everything: list[dict[str, Any]] = []
+        rows: list[dict[str, Any]] = []
+        references: list[dict[str, float]] = []
+        for point, state in zip(points, reached, strict=True):
+            folder = output / RUNS / point.name
+            results, known = _collected(folder, state)
+            chosen = {name: results.get(name, Estimate(np.nan)) for name in study.collect} or results
+            head = {"status": state.status, "time": state.time, "seconds": state.seconds}
+            everything.append(results)
+            rows.append(dict(point.parameters) | head | chosen | {"folder": f"{RUNS}/{point.name}"})
+            references.append(known)
+        return cls(study, output / study.name, rows, references, reached, everything)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the study asks for and no finished run has, in words."""
+        known = {name for row in self.found for name in row}
+        wanted = [("collect", name) for name in self.study.collect]
+        wanted += [(f"figure {figure.name}, y", y) for figure in self.study.figures for y in figure.curves]
+        return [
+            f"{where}: no result '{name}'; {suggest(name, known)}"
+            for where, name in wanted
+            if name not in known and known
+        ]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every run has ended: finished, diverged, or skipped after one that diverged."""
+        return all(state.status in ENDED for state in self.states)
+
+    def save(self) -> None:
+        """Write ``results.csv``, ``results.md`` and the figures to :attr:`path`."""
+        self.path.mkdir(parents=True, exist_ok=True)
+        self._save_csv(self.path / "results.csv")
+        figures = self.draw()
+        for name, figure in figures.items():
+            figure.savefig(self.path / f"{name}.png", dpi=120)
+        (self.path / "results.md").write_text(self.to_markdown([*figures]), encoding="utf-8")
+
+    def _columns(self) -> list[str]:
+        return list(dict.fromkeys(name for row in self.rows for name in row))
+
+    def _save_csv(self, path: Path) -> None:
+        columns = self._columns()
+        uncertain = {name for row in self.rows for name, value in row.items() if _uncertainty(value) is not None}
+        header = [cell for name in columns for cell in ([name, f"{name}, ±"] if name in uncertain else [name])]
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(header)
+            for row in self.rows:
+                cells = []
+                for name in columns:
+                    cells.append(_cell(row.get(name, "")))
+                    if name in uncertain:
+                        cells.append(_cell(_uncertainty(row.get(name)) or ""))
+                writer.writerow(cells)
+
+    def to_markdown(self, figures: list[str] | None = None) -> str:
+        """Return the results as Markdown, with the pictures `figures` from files beside it."""
+        titles = {figure.name: figure.title or figure.name for figure in self.study.figures}
+        parts = [f"# {self.study.title or self.study.name}", self.study.source, self._table()]
+        parts += [
+            f"*{row['folder']} failed: {state.message}*"
+            for row, state in zip(self.rows, self.states, strict=True)
+            if state.status == "failed"
+        ]
+        parts += [f"*{warning}*" for warning in self.warnings]
+        parts += [f"![{titles[name]}]({name}.png)\n\n*{titles[name]}*" for name in figures or []]
+        return "\n\n".join(part for part in parts if part) + "\n"
+
+    def _table(self) -> str:
+        columns = [name for name in self._columns() if name not in ("folder", "seconds")]
+        lines = [[_shown(row.get(name, "")) for name in columns] for row in self.rows]
+        for published in self.study.published:
+            values = published.parameters | {"status": published.label} | published.values
+            lines.append([_shown(values.get(name, "")) for name in columns])
+        lines += [
+            [_shown((parameters | {"status": "reference"} | known).get(name, "")) for name in columns]
+            for parameters, known in self._distinct_references()
+        ]
+        return markdown(columns, lines)
+
+    def _distinct_references(self) -> list[tuple[dict[str, Any], dict[str, float]]]:
+        """Return each set of reference values once, with the parameters that all its runs share."""
+        groups: list[tuple[dict[str, Any], dict[str, float]]] = []
+        swept = self.study.swept
+        for row, known in zip(self.rows, self.references, strict=True):
+            mine = {name: row[name] for name in swept if name in row}
+            for shared, other in groups:
+                if other == known:
+                    for name in [name for name in shared if shared[name] != mine.get(name)]:
+                        del shared[name]
+                    break
+            else:
+                if known:
+                    groups.append((mine, known))
+        return groups
+
+    def __str__(self) -> str:
+        """Return the table."""
+        return self._table()
+
+    def _repr_html_(self) -> str:
+        columns = [name for name in self._columns() if name != "folder"]
+        head = "".join(f"<th>{html.escape(name)}</th>" for name in columns)
+        body = "".join(
+            "<tr>" + "".join(f"<td>{html.escape(_shown(row.get(name, '')))}</td>" for name in columns) + "</tr>"
+            for row in self.rows
+        )
+        return f"<table><tr>{head}</tr>{body}</table>"
+
+    def draw(self) -> dict[str, Picture]:
+        """Return the figures that can be drawn from the runs that have finished, by name."""
+        draw = {"curves": self._curves, "profile": self._profiles, "fields": self._fields}
+        pictures = {figure.name: draw[figure.kind](figure) for figure in self.study.figures}
+        return {name: picture for name, picture in pictures.items() if picture is not None}
+
+    def _chosen(self, figure: Figure) -> list[int]:
+        """Return the finished runs that a figure shows."""
+        where = dict(figure.where)
+        if figure.finest:
+            where[figure.finest] = max((row[figure.finest] for row in self.rows if figure.finest in row), default=None)
+        return [
+            index
+            for index, row in enumerate(self.rows)
+            if row["status"] == "finished" and all(row.get(name) == value for name, value in where.items())
+        ]
+
+    def _series(self, row: Mapping[str, Any], without: str = "") -> str:
+        """Return the name of the series that a run belongs to, in the paper's form."""
+        parts = []
+        for name in self.study.swept:
+            if name != without and name in row and name in self.study.varied:
+                parts.append(_LEGEND.get(name, "{name} {value}").format(name=name, value=text(row[name])))
+        return " ".join(parts)
+
+    def _curves(self, figure: Figure) -> Picture | None:
+        chosen = self._chosen(figure)
+        panels: dict[str, list[Curve]] = {}
+        for y in figure.y:
+            series: dict[str, list[tuple[float, Any]]] = {}
+            known: dict[float, float] = {}
+            for index in chosen:
+                row = self.rows[index]
+                if not _is_nan(self.found[index].get(y)) and not _is_nan(row.get(figure.x)):
+                    series.setdefault(self._series(row, figure.x), []).append((row[figure.x], self.found[index][y]))
+                if y in self.references[index]:
+                    known[row[figure.x]] = self.references[index][y]
+            curves = [Curve(name, *_sorted(points)) for name, points in series.items()]
+            if known:
+                curves.append(Curve("reference", *_sorted(list(known.items())), style="k--"))
+            curves += [
+                Curve(other.label, [other.parameters[figure.x]], [other.values[y]], style=marker)
+                for other, marker in zip(self.study.published, _MARKERS, strict=False)
+                if figure.x in other.parameters and y in other.values
+            ]
+            panels[figure.labels.get(y, y)] = curves
+        if not any(panels.values()):
+            return None
+        label = figure.labels.get(figure.x, figure.x)
+        return plotting.panels(panels, label, figure.logarithmic)
+
+    def _runs(self, figure: Figure) -> dict[str, Run]:
+        return {
+            self._series(self.rows[index]): Run(self.path.parent / self.rows[index]["folder"])
+            for index in self._chosen(figure)
+        }
+
+    def _profiles(self, figure: Figure) -> Picture | None:
+        curves: dict[str, Profile] = {}
+        for name, run in self._runs(figure).items():
+            curves.update((name, profile) for profile in run.profiles if profile.name == figure.profile)
+        return plotting.profile(curves) if curves else None
+
+    def _fields(self, figure: Figure) -> Picture | None:
+        """Pictures of fields at the largest lift of the last snapshots, one column for each field."""
+        runs = self._runs(figure)
+        snapshots = {name: (run.snapshot(_time_of_largest_lift(run)), run.spacing) for name, run in runs.items()}
+        return plotting.fields(snapshots, figure.y, figure.view or None) if snapshots else None
+
+
+_LEGEND = {
+    "resolution": "$D/\\Delta x$ = {value}",
+    "algorithm": "({value})",
+    "reynolds": "Re = {value}",
+    "time_step": "$\\Delta tU/\\Delta x$ = {value}",
+    "max_iterations": "{value} iterations",
+}
+_MARKERS = ("k*", "kx", "k+", "k^", "kv", "ks", "kd")
+SNAPSHOTS_AT_LIFT = 10
+
+
+def _time_of_largest_lift(run: Run) -> float | None:
+    """Return the time of that of the last snapshots at which the lift is largest; None without lift."""
+    lift = run.coefficient("y")
+    times = run.times[-SNAPSHOTS_AT_LIFT:]
+    if not len(times) or not np.isfinite(lift).any():
+        return None
+    at = np.interp(times, run.history["time"], lift)
+    return float(times[np.argmax(at)])
+
+
+def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, float]]:
+    """Return the results of a finished run by name, and the reference values of those that have one."""
+    if state.status != "finished":
+        return {}, {}
+    try:
+        run = Run(folder)
+        results: dict[str, Any] = {measure.name: measure.value for measure in run.measures}
+        known = {measure.name: measure.reference for measure in run.measures if abs(measure.reference) > 0}
+        results[DIVERGENCE] = run.divergence.mean
+        results["sum of the velocity divergence, Σ|∇·u| D/U"] = run.divergence.sum
+        results["shedding periods"] = run.window.periods
+        results["steps"] = len(run.history["time"])
+        results["mean time step, ΔtU/Δx"] = float(np.mean(run.history["time_step"])) / run.spacing
+        results["mean iterations"] = float(np.mean(run.history["iterations"]))
+        return results, known
+    except (AlsphError, KeyError) as error:
+        return {"message": str(error)}, {}
+
+
+def _sorted(points: list[tuple[Any, Any]]) -> tuple[list[float], list[float], list[float]]:
+    """Return abscissae, numbers increasing and words as they come, with ordinates and the uncertainties of these."""
+    if any(isinstance(x, str) for x, _ in points):
+        points = [(str(x), y) for x, y in points]
+    else:
+        points = sorted(points, key=lambda point: point[0])
+    return [x for x, _ in points], [float(y) for _, y in points], [_uncertainty(y) or 0.0 for _, y in points]
+
+
+def _uncertainty(value: Any) -> float | None:
+    return value.uncertainty if isinstance(value, Estimate) and np.isfinite(value.uncertainty) else None
+
+
+def _is_nan(value: Any) -> bool:
+    return value is None or (isinstance(value, float) and bool(np.isnan(value)))
+
+
+def _cell(value: Any) -> str:
+    return repr(float(value)) if isinstance(value, float) else str(value)
+
+
+def _shown(value: Any) -> str:
+    if _is_nan(value):
+        return ""
+    return str(value) if isinstance(value, Estimate) else text(value)

@@ -1,0 +1,132 @@
+//! Breakdown of a computation: what is looked for after every step, and what is likely to have caused it.
+
+use crate::kernel::Smoothing;
+use crate::parallel;
+use crate::particles::{ParticleKind, Particles, Vector};
+use crate::settings::{Boundary, Settings, TimeStepLimits};
+use crate::with_kernel;
+
+/// A particle whose neighbours' kernels sum to less than this part of its own is alone.
+const LONELY: f64 = 0.25;
+
+/// What is wrong with a particle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Symptom {
+    pub particle: usize,
+    /// ``velocity``, ``pressure``, ``position`` or ``volume``.
+    pub field: &'static str,
+    /// Speed, pressure, distance beyond the domain, or volume.
+    pub value: f64,
+}
+
+/// The first particle, if any, that has a value that is not finite, would cross more than Δx in a step, is faster than the
+/// velocity limit, has left the domain through a wall, or has no neighbours. `volume` are those of the present step.
+pub fn find<const D: usize>(
+    settings: &Settings,
+    particles: &Particles<D>,
+    volume: &[f64],
+    time_step: f64,
+) -> Option<Symptom> {
+    let fastest = settings.velocity_limit.unwrap_or(f64::INFINITY).min(settings.particle_spacing / time_step);
+    let largest = largest_volume(settings);
+    let radius = settings.support_radius();
+    let bad = |i: usize| {
+        let symptom = |field, value| Some(Symptom { particle: i, field, value });
+        if !particles.pressure[i].is_finite() {
+            return symptom("pressure", particles.pressure[i]);
+        }
+        if particles.kind[i] == ParticleKind::Solid {
+            return None;
+        }
+        let speed = particles.velocity[i].norm();
+        if speed.is_nan() || speed > fastest {
+            return symptom("velocity", speed);
+        }
+        if particles.kind[i] == ParticleKind::Fluid {
+            let beyond = beyond_walls(settings, &particles.position[i]);
+            if beyond > radius {
+                return symptom("position", beyond);
+            }
+            if volume[i] > largest {
+                return symptom("volume", volume[i]);
+            }
+        }
+        None
+    };
+    parallel::reduce(particles.real, |mut range| range.find_map(bad), Option::or).flatten()
+}
+
+/// V of a particle that is alone but for a few neighbours at the edge of its support.
+fn largest_volume(settings: &Settings) -> f64 {
+    let own = with_kernel!(settings.kernel, K => {
+        Smoothing::<K>::new(settings.smoothing_length(), settings.dimensions).value(0.0)
+    });
+    1.0 / ((1.0 + LONELY) * own)
+}
+
+/// How far `position` lies beyond the sides of the domain that particles cannot cross.
+fn beyond_walls<const D: usize>(settings: &Settings, position: &Vector<D>) -> f64 {
+    let domain = &settings.domain;
+    let closed = |side| !matches!(side, Boundary::Inlet | Boundary::Outlet);
+    (0..D).fold(0.0, |farthest: f64, axis| {
+        let [lower, upper] = domain.boundaries[axis];
+        let below = if closed(lower) { domain.lower[axis] - position[axis] } else { 0.0 };
+        let above = if closed(upper) { position[axis] - domain.upper[axis] } else { 0.0 };
+        farthest.max(below).max(above)
+    })
+}
+
+/// The likely cause of a symptom, and a remedy. `limits` are those of the velocities before the step.
+pub fn likely_cause<const D: usize>(
+    settings: &Settings,
+    particles: &Particles<D>,
+    symptom: Symptom,
+    time_step: f64,
+    limits: TimeStepLimits,
+) -> String {
+    let bounds = [("penalty", limits.penalty), ("viscous", limits.viscous), ("body force", limits.body_force)];
+    let (name, bound) = bounds.into_iter().fold(bounds[0], |least, next| if next.1 < least.1 { next } else { least });
+    // A hair of room, because a step at its bound is not beyond it.
+    if time_step > 1.001 * bound {
+        let ratio = time_step / bound;
+        return format!(
+            "the time step {time_step:.3e} is {ratio:.1} times the {name} limit of the velocities before it, {bound:.3e}: \
+             take a smaller time step, or an adaptive one"
+        );
+    }
+    match symptom.field {
+        "position" => "it has gone through a wall: take a smaller time step or a finer resolution".into(),
+        "volume" => "a void has opened around it: take a smaller time step, a finer resolution, or more shifting".into(),
+        _ => format!(
+            "{}: take a smaller time step, a smaller penalty constant or a finer resolution",
+            place(settings, particles, symptom.particle)
+        ),
+    }
+}
+
+/// Where a particle is, in words.
+fn place<const D: usize>(settings: &Settings, particles: &Particles<D>, i: usize) -> String {
+    let near = 2.0 * settings.support_radius();
+    match particles.kind[i] {
+        ParticleKind::Inlet => return "it is in the inlet buffer".into(),
+        ParticleKind::Outlet => return "it is in the outlet buffer".into(),
+        _ => {}
+    }
+    let domain = &settings.domain;
+    for axis in 0..D {
+        let x = particles.position[i][axis];
+        for (side, distance) in domain.boundaries[axis].iter().zip([x - domain.lower[axis], domain.upper[axis] - x]) {
+            match side {
+                Boundary::Inlet if distance < near => return "it is near the inlet".into(),
+                Boundary::Outlet if distance < near => return "it is near the outlet".into(),
+                _ => {}
+            }
+        }
+    }
+    let distance = |&j: &usize| (particles.position[j] - particles.position[i]).norm();
+    let solid = (0..particles.real).filter(|&j| particles.kind[j] == ParticleKind::Solid && j != i);
+    match solid.min_by(|a, b| distance(a).total_cmp(&distance(b))) {
+        Some(j) if distance(&j) < near => format!("it is near \"{}\"", settings.bodies[particles.body[j] as usize].name),
+        _ => "it is in the open flow".into(),
+    }
+}

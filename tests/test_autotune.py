@@ -1,0 +1,52 @@
+"""Autotune: the step that it finds is the stability law's, and its case runs."""
+
+import math
+
+import pytest
+from alsph import config
+from alsph.autotune import autotune
+from alsph.cases import TaylorGreen
+from alsph.errors import ConfigError
+
+
+@pytest.fixture(scope="module")
+def tuning():
+    case = TaylorGreen(resolution=16, reynolds=100, max_iterations=5, projection_sweeps=0)
+    return autotune(case, 5e-3, develop=0.2, probe=0.3, threads=1, progress=False)
+
+
+def test_the_largest_stable_step_is_near_the_stability_law(tuning):
+    law = tuning.case.time_step_limits()["penalty"]
+    assert 0.6 * law < tuning.largest_stable < 1.6 * law
+    assert tuning.largest_stable < tuning.smallest_unstable <= tuning.largest_stable * 2**0.5 * 1.001
+    assert not any(probe.stable for probe in tuning.probes if probe.time_step >= tuning.smallest_unstable)
+
+
+def test_the_cheapest_probe_that_is_good_enough_is_taken(tuning):
+    tried = [p for p in tuning.probes if p.stable and p.time_step == tuning.case.time_step]
+    good = [p for p in tried if p.divergence <= tuning.target]
+    assert tuning.reached == bool(good)
+    best = min(good, key=lambda p: p.cost) if good else min(tried, key=lambda p: p.divergence)
+    assert (tuning.case.max_iterations, tuning.case.projection_sweeps) == (best.max_iterations, best.projection_sweeps)
+    assert tuning.case.time_step == pytest.approx(0.9 * tuning.largest_stable)
+
+
+def test_report_and_case_are_saved(tuning, tmp_path):
+    tuning.save(tmp_path / "tuned")
+    assert config.load(tmp_path / "tuned" / "case.toml").case == tuning.case
+    assert str(tuning) in (tmp_path / "tuned" / "report.md").read_text()
+
+
+def test_a_target_out_of_reach_gives_the_least_divergence():
+    case = TaylorGreen(resolution=12, max_iterations=2, projection_sweeps=0)
+    tuning = autotune(case, 1e-9, develop=0.1, probe=0.1, threads=1, progress=False)
+    tried = [p for p in tuning.probes if p.stable and p.time_step == tuning.case.time_step]
+    assert not tuning.reached and tuning.case.max_iterations == min(tried, key=lambda p: p.divergence).max_iterations
+
+
+@pytest.mark.parametrize("number", [0, -1, math.nan, math.inf])
+@pytest.mark.parametrize("name", ["divergence", "develop", "probe", "margin"])
+def test_numbers_that_cannot_be_used_are_refused(name, number):
+    arguments = {"divergence": 1e-3} | {name: number}
+    with pytest.raises(ConfigError, match=name):
+        autotune(TaylorGreen(), progress=False, **arguments)

@@ -1,0 +1,62 @@
+"""Grid convergence: exact sequences, what is no convergence, and a case."""
+
+import math
+
+import pytest
+from alsph import convergence
+from alsph.cases import TaylorGreen
+from alsph.config import Config, RunSettings
+from alsph.convergence import converge, grid_convergence
+from alsph.errors import ConfigError
+from hypothesis import given
+from hypothesis import strategies as st
+
+
+@given(
+    order=st.floats(0.3, 5.0),
+    limit=st.floats(-10, 10).filter(lambda x: abs(x) > 0.1),
+    slope=st.floats(0.1, 5.0),
+    ratios=st.tuples(st.floats(1.2, 2.5), st.floats(1.2, 2.5)),
+)
+def test_order_and_limit_of_a_power_law_are_recovered_at_any_ratios(order, limit, slope, ratios):
+    resolutions = [10.0, 10 * ratios[0], 10 * ratios[0] * ratios[1]]
+    found = grid_convergence("f", resolutions, [limit + slope * (10 / n) ** order for n in resolutions])
+    assert found.kind == "monotonic"
+    assert found.order == pytest.approx(order, rel=1e-4)
+    assert found.richardson == pytest.approx(limit, abs=1e-4)
+    error = abs(found.values[-1] - limit)
+    assert found.index * abs(found.values[-1]) == pytest.approx(1.25 * error, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("values", "kind"), [([1, 2, 1.5], "oscillating"), ([1, 2, 4], "diverging"), ([1, math.nan, 4], "diverging")]
+)
+def test_what_is_no_monotonic_convergence_has_no_order(values, kind):
+    found = grid_convergence("f", [10, 20, 40], values)
+    assert found.kind == kind and math.isnan(found.order) and math.isnan(found.richardson)
+
+
+def test_errors_have_an_order_and_no_relative_index():
+    found = grid_convergence("error", [10, 20, 40], [0.16, 0.04, 0.01], reference=0.0)
+    assert found.order == pytest.approx(2) and math.isnan(found.index)
+
+
+def test_too_few_or_unordered_resolutions_are_refused():
+    with pytest.raises(ConfigError, match="three"):
+        grid_convergence("f", [10, 20], [1, 2])
+    with pytest.raises(ConfigError, match="increase"):
+        grid_convergence("f", [10, 40, 20], [1, 2, 3])
+    with pytest.raises(ConfigError, match="three or more"):
+        converge(Config(TaylorGreen()), [10, 20, 20])
+
+
+def test_a_case_is_run_judged_and_drawn(tmp_path):
+    config = Config(TaylorGreen(reynolds=50), RunSettings(until=0.1, output_interval=0.05))
+    report = converge(config, [12, 8, 16], tmp_path, progress=False)
+    rate = next(found for found in report.convergences if found.name.startswith("decay rate"))
+    assert rate.resolutions == (8, 12, 16) and len(rate.values) == 3
+    assert rate.reference == pytest.approx(16 * math.pi**2 / 50)
+    text = (report.path / "convergence.md").read_text()
+    assert str(report) in text and "convergence.png" in text
+    assert (report.path / "convergence.png").stat().st_size > 10_000
+    assert convergence.SAFETY == 1.25

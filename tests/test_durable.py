@@ -1,0 +1,155 @@
+"""Files that a cut never leaves half-written."""
+
+import io
+import os
+import signal
+import struct
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from alsph import durable
+from alsph.durable import _Overlay, growing, recover, replacing
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+OPERATIONS = st.lists(st.tuples(st.booleans(), st.integers(0, 20000), st.binary(max_size=9000)), max_size=20)
+
+
+@settings(deadline=None)
+@given(content=st.binary(max_size=12000), operations=OPERATIONS, cut=st.integers(0, 20000) | st.none())
+def test_an_overlay_is_a_file_that_changes_at_the_end_only(tmp_path_factory, content, operations, cut):
+    path = tmp_path_factory.getbasetemp() / "overlay"
+    path.write_bytes(content)
+    expected = io.BytesIO(content)
+    with _Overlay(path) as overlay:
+        for is_write, place, data in operations:
+            place = min(place, len(expected.getvalue()))
+            for file in (overlay, expected):
+                file.seek(place)
+            if is_write:
+                assert overlay.write(data) == expected.write(data)
+            else:
+                found = bytearray(len(data))
+                count = overlay.readinto(found)
+                assert bytes(found[:count]) == expected.read(len(data))
+            assert overlay.seek(0, os.SEEK_END) == expected.seek(0, os.SEEK_END)
+        assert path.read_bytes() == content
+        if cut is not None:
+            cut = min(cut, len(expected.getvalue()))
+            assert overlay.truncate(cut) == expected.truncate(cut)
+        overlay.commit()
+    assert path.read_bytes() == expected.getvalue()
+    assert not list(path.parent.glob(".overlay*"))
+
+
+def grow(path, value):
+    """Add a row to a table, so that pages in the midst of the file change and new ones come."""
+    with growing(path) as file:
+        if "table" not in file:
+            file.create_dataset("table", (0, 700), float, maxshape=(None, 700), chunks=(1, 700), compression="gzip")
+        file["table"].resize(len(file["table"]) + 1, axis=0)
+        file["table"][-1] = np.random.default_rng(value).random(700)
+        file.attrs["rows"] = len(file["table"])
+
+
+def rows(path):
+    with h5py.File(path) as file:
+        assert file.attrs["rows"] == len(file["table"])
+        return [row.tobytes() for row in file["table"]]
+
+
+def killed_at(event, action):
+    """Do something in a child that kills itself at a given event that touches the disk; return whether it did."""
+    child = os.fork()
+    if child == 0:
+        left = event
+
+        def counted(function):
+            def call(*arguments, **options):
+                nonlocal left
+                left -= 1
+                if left < 0:
+                    os.kill(os.getpid(), signal.SIGKILL)
+                return function(*arguments, **options)
+
+            return call
+
+        os.fsync = counted(os.fsync)
+        struct.unpack_from = counted(struct.unpack_from)  # once before every page
+        Path.replace, Path.unlink = counted(Path.replace), counted(Path.unlink)
+        action()
+        os._exit(0)
+    return os.WIFSIGNALED(os.waitpid(child, 0)[1])
+
+
+def test_a_process_killed_at_any_moment_leaves_the_old_file_or_the_new_one(tmp_path):
+    path = tmp_path / "table.h5"
+    for value in range(40):
+        grow(path, value)
+    old = rows(path)
+    content = path.read_bytes()
+    grow(path, 40)
+    new = rows(path)
+    seen, event = set(), 0
+    while True:
+        path.write_bytes(content)
+        if not killed_at(event, lambda: grow(path, 40)):
+            break
+        recover(path)
+        found = rows(path)
+        assert found in (old, new)
+        seen.add(len(found))
+        # The next change starts from there.
+        grow(path, 50)
+        assert rows(path)[:-1] == found
+        event += 1
+    assert event > 8 and seen == {40, 41}
+
+
+def test_an_exception_leaves_the_old_file(tmp_path):
+    path = tmp_path / "table.h5"
+    grow(path, 0)
+    content = path.read_bytes()
+    with pytest.raises(ZeroDivisionError), growing(path) as file:
+        file["more"] = np.ones(10000)
+        raise ZeroDivisionError
+    assert path.read_bytes() == content
+    with pytest.raises(ZeroDivisionError), replacing(path) as temporary:
+        temporary.write_text("half")
+        raise ZeroDivisionError
+    assert path.read_bytes() == content
+    assert [entry.name for entry in tmp_path.iterdir()] == ["table.h5"]
+
+
+@pytest.mark.parametrize("journal", [b"", b"nonsense", durable.MAGIC + bytes(100)])
+def test_a_journal_that_is_none_is_dropped(tmp_path, journal):
+    path = tmp_path / "table.h5"
+    grow(path, 0)
+    content = path.read_bytes()
+    durable._journal(path).write_bytes(journal)
+    recover(path)
+    assert path.read_bytes() == content
+    assert not durable._journal(path).exists()
+
+
+def test_a_full_disk_leaves_the_old_file(tmp_path):
+    """A limit of the size of files makes writes fail as a full disk does."""
+    path = tmp_path / "table.h5"
+    for value in range(40):
+        grow(path, value)
+    old, size = rows(path), path.stat().st_size
+    for room in (0, 100, 3000):
+        child = os.fork()
+        if child == 0:
+            import resource
+
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size + room, resource.RLIM_INFINITY))
+            try:
+                grow(path, 40)
+            except OSError:
+                os._exit(7)
+            os._exit(0)
+        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+        assert rows(path) == old

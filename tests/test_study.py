@@ -1,0 +1,369 @@
+"""Parameter studies: declaration, caching, interruption, and clusters."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time as clock
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from alsph import study
+from alsph.errors import ConfigError, WalltimeError
+from alsph.study import Figure, Study, Sweep
+from alsph.study.execution import _jobs
+from alsph.study.state import RUNS
+
+DECAY = "decay rate of the kinetic energy, U/D"
+VORTEX = {"case": "taylor_green", "resolution": 16, "run": {"until": 0.2, "output_interval": 0.1}}
+
+
+def declare(**changes):
+    values = {"name": "few", "base": VORTEX, "sweep": Sweep(product={"reynolds": [50, 100]})} | changes
+    return Study(**values)
+
+
+def bits(path: Path) -> dict[str, bytes]:
+    """The final state of a run, to the last bit."""
+    with h5py.File(path / "checkpoint.h5") as file:
+        return {name: table[()].tobytes() for name, table in file.items()} | {"time": file.attrs["time"].tobytes()}
+
+
+# Declaration
+
+
+def test_product_together_and_sets_are_combined_and_ladders_follow_each_other():
+    sweep = Sweep(
+        product={"algorithm": [1, 2]},
+        together={"reynolds": [100, 200], "time_step": [0.05, 0.03]},
+        sets=[{"max_iterations": 2}, {"max_iterations": 5, "run.until": 0.3}],
+    )
+    points = declare(sweep=sweep).points()
+    assert len(points) == 2 * 2 * 2
+    assert {(p.config.case.reynolds, p.config.case.time_step) for p in points} == {(100, 0.05), (200, 0.03)}
+    assert {(p.config.case.max_iterations, p.config.until) for p in points} == {(2, 0.2), (5, 0.3)}
+    ladder = Sweep(product={"algorithm": [1, 2]}, until_diverged={"time_step": [0.01, 0.02, 0.04]})
+    points = declare(sweep=ladder).points()
+    assert [p.after and p.after.config.case.time_step for p in points] == 2 * [None, 0.01, 0.02]
+    assert all(p.after is None or p.after.config.case.algorithm == p.config.case.algorithm for p in points)
+
+
+def test_the_name_of_a_run_depends_on_its_configuration_and_not_on_how_it_is_run():
+    first, second = declare().points()
+    assert first.name != second.name
+    (other,) = declare(name="other", sweep=Sweep(sets=[{"reynolds": 50, "run.threads": 2}])).points()
+    assert other.name == first.name
+    # Defaults that are written out change nothing.
+    (explicit,) = declare(sweep=Sweep(sets=[{"reynolds": 50, "max_iterations": 2}])).points()
+    assert explicit.name == first.name
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"sweep": Sweep(product={"reynold": [1]})}, "did you mean 'reynolds'"),
+        ({"sweep": Sweep(product={"case.reynolds": [1]})}, "must be a parameter of the case"),
+        ({"sweep": Sweep(product={"resolution": [3]})}, "resolution = 3"),
+        ({"base": {"resolution": 8}}, "case: missing"),
+    ],
+)
+def test_a_sweep_that_makes_no_case_is_refused_with_the_reason(changes, message):
+    with pytest.raises(ConfigError, match=message):
+        declare(**changes).points()
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Sweep(together={"a": [1, 2], "b": [1]}), "as many values"),
+        (lambda: Sweep(product={"a": []}), "has no values"),
+        (lambda: Sweep(until_diverged={"a": [1], "b": [1]}), "takes one parameter"),
+        (lambda: Figure(name="f", kind="profile"), "need profile"),
+        (lambda: Figure(name="../f", x="a", y=["b"]), "name"),
+        (lambda: declare(figures=[Figure(name="f", x="reynold", y=["b"])]), "did you mean 'reynolds'"),
+        (lambda: declare(name="../up"), "name"),
+    ],
+)
+def test_a_declaration_that_cannot_be_used_is_refused_with_the_reason(make, message):
+    with pytest.raises(ConfigError, match=message):
+        make()
+
+
+def test_files_that_cannot_be_used_are_refused_with_their_name(tmp_path):
+    path = tmp_path / "study.toml"
+    for content, message in (
+        ("name = ", "not a TOML file"),
+        ('name = "a"', "base"),
+        ('name = "a"\nbase = {}\nnonsense = 1', "unknown parameter"),
+        ('name = "a"\npreset = "quick"', "preset = 'quick': must be a table"),
+        ('name = "a"\n[base]\nrun = 3', "base.run = 3: must be a table"),
+        ('name = "a"\n[figure]\nname = "b"', "double brackets"),
+        ('name = "a"\n[base]\n[[figure]]\nname = "b"\nkind = "fields"\ny = ["vortex"]', "did you mean 'vorticity'"),
+        ('name = "a"\nbase = {}\n[[figure]]\nname = "b"\nkind = "curve"', "kind"),
+    ):
+        path.write_text(content)
+        with pytest.raises(ConfigError, match=f"study.toml: .*{message}"):
+            study.load(path)
+    with pytest.raises(ConfigError, match="did you mean 'reynolds'"):
+        study.load("reynold")
+    with pytest.raises(ConfigError, match="unknown preset 'fast'"):
+        study.load("reynolds", "fast")
+
+
+@pytest.mark.parametrize("name", study.shipped())
+def test_the_studies_of_the_paper_declare_its_runs(name):
+    for preset in ("quick", "paper"):
+        declared = study.load(name, preset)
+        points = declared.points()
+        assert len({point.name for point in points}) == len(points)
+        assert {point.config.case.algorithm for point in points} == {1, 2}
+        assert all(point.config.case.projection_sweeps == 0 for point in points)
+    assert declared.points()[-1].config.case.resolution == 30
+    assert {figure.name for figure in declared.figures} == {
+        "time-step": {"figure_3", "figure_4", "figure_5"},
+        "iterations": {"figure_6", "figure_7", "figure_8", "figure_9", "figure_10"},
+        "reynolds": {"figure_11", "figure_12", "figure_13"},
+    }[name]
+
+
+# Running
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    output = tmp_path_factory.mktemp("studies")
+    figures = [Figure(name="decay", x="reynolds", y=[DECAY])]
+    return study.run(declare(figures=figures), output, progress=False)
+
+
+def test_a_study_writes_rows_tables_and_figures(done):
+    assert done.complete and [row["reynolds"] for row in done.rows] == [50, 100]
+    assert not done.warnings
+    assert done.rows[0][DECAY] > done.rows[1][DECAY] > 0
+    assert {path.name for path in done.path.iterdir()} == {"results.csv", "results.md", "decay.png"}
+    with (done.path / "results.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["reynolds"]) for row in rows] == [50, 100]
+    assert float(rows[1][DECAY]) == done.rows[1][DECAY]
+    assert "![decay](decay.png)" in (done.path / "results.md").read_text()
+
+
+def test_a_study_asked_for_again_runs_only_what_is_missing_and_shares_runs(done):
+    output = done.path.parent
+    before = {path: (path / "run.json").stat().st_mtime_ns for path in (output / RUNS).iterdir()}
+    more = declare(name="more", sweep=Sweep(product={"reynolds": [100, 200]}))
+    results = study.run(more, output, progress=False)
+    after = {path: (path / "run.json").stat().st_mtime_ns for path in (output / RUNS).iterdir()}
+    assert len(after) == 3 and all(after[path] == before[path] for path in before)
+    assert results.rows[0] == done.rows[1]
+
+
+def test_misspelt_results_are_warned_of_and_lose_nothing(done):
+    wrong = declare(
+        collect=["decay rate"], figures=[Figure(name="decay", x="reynolds", y=["decay rate of the energy"])]
+    )
+    results = study.run(wrong, done.path.parent, progress=False)
+    assert len(results.warnings) == 2
+    assert "did you mean 'decay rate of the kinetic energy, U/D'" in results.warnings[1]
+    assert results.complete and not results.draw()
+
+
+def test_a_ladder_ends_with_the_run_that_diverges_which_is_a_result(tmp_path):
+    base = VORTEX | {"adaptive_time_step": False}
+    ladder = declare(base=base, sweep=Sweep(until_diverged={"time_step": [0.05, 0.3, 0.4, 0.5]}))
+    results = study.run(ladder, tmp_path, progress=False)
+    assert [row["status"] for row in results.rows] == ["finished", "diverged", "skipped", "skipped"]
+    assert results.complete and 0 <= results.rows[1]["time"] < 0.2
+    again = study.run(ladder, tmp_path, progress=False)
+    assert [row["status"] for row in again.rows] == [row["status"] for row in results.rows]
+
+
+def test_a_run_that_fails_is_reported_and_the_others_go_on(tmp_path):
+    broken = declare().points()[0]
+    (tmp_path / RUNS).mkdir()
+    (tmp_path / RUNS / broken.name).write_text("no folder")
+    results = study.run(declare(), tmp_path, progress=False)
+    assert [row["status"] for row in results.rows] == ["failed", "finished"]
+    assert not results.complete and broken.name in results.states[0].message
+
+
+def test_a_run_that_failed_before_is_tried_again(tmp_path):
+    path = tmp_path / RUNS / declare().points()[0].name
+    path.mkdir(parents=True)
+    (path / "run.json").write_text(json.dumps({"status": "failed"}))
+    assert study.run(declare(), tmp_path, progress=False).complete
+
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from alsph.io import RunFolder
+
+folder = RunFolder(Path(sys.argv[1]))
+with folder.claimed():
+    print("claimed", flush=True)
+    time.sleep(3)
+    sys.exit((folder.path / "case.toml").exists())
+"""
+
+
+def test_a_run_that_another_study_makes_is_waited_for(tmp_path):
+    path = tmp_path / RUNS / declare().points()[0].name
+    other = subprocess.Popen([sys.executable, "-c", HOLDER, path], stdout=subprocess.PIPE)
+    assert other.stdout.readline() == b"claimed\n"
+    results = study.run(declare(), tmp_path, progress=False)
+    assert other.wait() == 0, "the run was begun while the other one held its folder"
+    assert results.complete
+
+
+def test_words_on_the_abscissa_are_drawn(done):
+    sweep = Sweep(product={"algorithm": [2, "midpoint"]})
+    figures = [Figure(name="decay", x="algorithm", y=[DECAY])]
+    assert study.run(declare(sweep=sweep, figures=figures), done.path.parent, progress=False).draw()
+
+
+def test_never_more_threads_than_cores():
+    cores = len(os.sched_getaffinity(0))
+    assert _jobs(None, 1) == cores and _jobs(None, 10 * cores) == 1 and _jobs(1, 10 * cores) == 1
+    with pytest.raises(ConfigError, match="on .* cores"):
+        _jobs(cores + 1, 1)
+    with pytest.raises(ConfigError, match="threads"):
+        _jobs(None, 0)
+
+
+# Interruption
+
+LONG = {"case": "taylor_green", "resolution": 36, "run": {"until": 0.6, "output_interval": 0.05}}
+LONG_TOML = """
+name = "long"
+[base]
+case = "taylor_green"
+resolution = 36
+[base.run]
+until = 0.6
+output_interval = 0.05
+[sweep.product]
+reynolds = [50, 100]
+"""
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The long study, never interrupted."""
+    output = tmp_path_factory.mktemp("whole")
+    study.run(declare(name="long", base=LONG), output, progress=False)
+    return {path.name: bits(path) for path in (output / RUNS).iterdir()}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_study_that_is_stopped_or_killed_goes_on_and_ends_with_the_same_bits(tmp_path, whole, number):
+    file, output = tmp_path / "long.toml", tmp_path / "out"
+    file.write_text(LONG_TOML)
+    process = alsph_study(file, "-o", output)
+    declared = study.load(file)
+    wait_for(lambda: any(s.time > 0.1 for s in study.states(declared.points(), output).values()))
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=60)
+    if number == signal.SIGINT:
+        assert process.returncode == 130 and "goes on from its checkpoint" in errors
+    wait_for(lambda: all(s.status != "running" for s in study.states(declared.points(), output).values()))
+    assert not all(s.status == "finished" for s in study.states(declared.points(), output).values())
+    results = study.run(declared, output, progress=False)
+    assert results.complete and not list((output / RUNS).glob("*.stop"))
+    assert {path.name: bits(path) for path in (output / RUNS).iterdir()} == whole
+
+
+def alsph_study(*arguments):
+    command = [sys.executable, "-c", "from alsph.cli import main; main()", "study", *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for(condition, seconds=60.0):
+    end = clock.monotonic() + seconds
+    while not condition():
+        assert clock.monotonic() < end, "waited in vain"
+        clock.sleep(0.1)
+
+
+# Clusters
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """A Dask scheduler and two workers, each a process of its own: the scheduler's address and the workers."""
+    file = tmp_path / "scheduler.json"
+    scheduler = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "distributed.cli.dask_scheduler",
+            "--scheduler-file",
+            file,
+            "--port",
+            "0",
+            "--host",
+            "127.0.0.1",
+            "--no-dashboard",
+        ],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    wait_for(file.exists)
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", file, "--nthreads", "1"]
+    workers = [
+        subprocess.Popen(
+            [*worker, "--no-nanny", "--no-dashboard", "--local-directory", tmp_path / f"worker{index}"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        for index in range(2)
+    ]
+    yield json.loads(file.read_text())["address"], workers
+    for process in (*workers, scheduler):
+        process.kill()
+        process.wait()
+
+
+def test_a_study_on_a_cluster_survives_the_death_of_a_worker_with_the_same_bits(tmp_path, whole, cluster):
+    address, workers = cluster
+    declared, output = declare(name="long", base=LONG), tmp_path / "out"
+    (tmp_path / "long.toml").write_text(LONG_TOML)
+    process = alsph_study(tmp_path / "long.toml", "-o", output, "--scheduler", address)
+    first = declared.points()[0].name
+
+    def owner():
+        path = output / RUNS / first / "run.json"
+        info = json.loads(path.read_text()) if path.exists() else {}
+        return info.get("pid") if study.states(declared.points(), output)[first].time > 0.1 else None
+
+    wait_for(owner)
+    killed = next(worker for worker in workers if worker.pid == owner())
+    killed.kill()
+    assert process.communicate(timeout=120) and process.returncode == 0
+    assert killed.wait() != 0
+    assert "resumed" in (output / RUNS / first / "run.log").read_text()
+    assert {path.name: bits(path) for path in (output / RUNS).iterdir()} == whole
+
+
+def test_a_scheduler_that_does_not_answer_is_an_error_of_the_user(tmp_path):
+    with pytest.raises(ConfigError, match="no Dask scheduler answers"):
+        study.run(declare(), tmp_path, scheduler="tcp://127.0.0.1:9", progress=False)
+
+
+def test_reading_a_study_that_runs_does_not_disturb_it(done):
+    points = done.study.points()
+    states = study.states(points, done.path.parent)
+    assert [states[point.name].status for point in points] == ["finished", "finished"]
+    assert np.isclose([states[point.name].time for point in points], 0.2, atol=0.01).all()
+
+
+def test_a_wall_time_ends_a_study_that_goes_on_later(tmp_path):
+    declared = declare(name="longer", base=LONG | {"run": {"until": 3.0}})
+    with pytest.raises(WalltimeError, match="each run goes on when the study is run again"):
+        study.run(declared, tmp_path, walltime=1.5, progress=False)
+    assert {state.status for state in study.states(declared.points(), tmp_path).values()} <= {"stopped", "waiting"}
+    assert study.run(declared, tmp_path, progress=False).complete
