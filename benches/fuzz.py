@@ -12,6 +12,7 @@ import faulthandler
 import json
 import random
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,6 +20,7 @@ import tempfile
 import time as clock
 import warnings
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 BATCH = 2000
@@ -45,8 +47,10 @@ def targets(folder):
     import h5py
     import numpy as np
     from alsph import checkpoint, config, open_run, reading, resume, study
+    from alsph.errors import AlsphError
 
     state = checkpoint.read(folder / "checkpoint.h5").state
+    until = state["time"] + 1e-9
     with h5py.File(folder / "version_1.h5", "w") as old:
         for name, value in state.items():
             if np.ndim(value):
@@ -70,15 +74,17 @@ def targets(folder):
             reading.snapshot(path, step)
 
     def whole(path):
+        """Look at a run and go on with it by a step."""
         name = path.name.removeprefix("damaged ")
-        original = (folder / name).read_bytes()
-        (folder / name).write_bytes(path.read_bytes())
+        copy = folder.with_name(f"copy {folder.name}")
+        shutil.copytree(folder, copy, dirs_exist_ok=True, ignore=shutil.ignore_patterns("damaged *"))
+        (copy / name).write_bytes(path.read_bytes())
         try:
-            run = open_run(folder)
-            run.summary()
-            resume(folder, until=0.0001, progress=False)
+            with suppress(AlsphError):
+                open_run(copy).summary()
+            resume(copy, until=until, progress=False)
         finally:
-            (folder / name).write_bytes(original)
+            shutil.rmtree(copy)
 
     (folder / "study.toml").write_bytes(
         Path(study.__file__).with_name("shipped").joinpath("reynolds.toml").read_bytes()
@@ -94,6 +100,10 @@ def targets(folder):
         "history": ("history.csv", reading.history),
         "run.json": ("run.json", whole),
         "case.toml of a run": ("case.toml", whole),
+        "particles of a run": ("particles.vtkhdf", whole),
+        "surface pressure of a run": ("surface.h5", whole),
+        "history of a run": ("history.csv", whole),
+        "checkpoint of a run": ("checkpoint.h5", whole),
     }
 
 

@@ -1,5 +1,6 @@
 //! Breakdown of a computation: what is looked for after every step, and what is likely to have caused it.
 
+use crate::frame::Frame;
 use crate::kernel::Smoothing;
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
@@ -9,24 +10,28 @@ use crate::with_kernel;
 /// A particle whose neighbours' kernels sum to less than this part of its own is alone.
 const LONELY: f64 = 0.25;
 
+/// How far under a surface [Δx] a particle is lost: beyond the outermost solid particles.
+const DEEP: f64 = 0.75;
+
 /// What is wrong with a particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Symptom {
     pub particle: usize,
     /// ``velocity``, ``pressure``, ``position`` or ``volume``.
     pub field: &'static str,
-    /// Speed, pressure, distance beyond the domain, or volume.
+    /// Speed, pressure, distance beyond the domain or under a surface, or volume.
     pub value: f64,
 }
 
 /// The first particle, if any, that has a value that is not finite, would cross more than Δx in a step, is faster than the
-/// velocity limit, has left the domain through a wall, or has no neighbours. `volume` are those of the present step.
+/// velocity limit, has left the domain through a wall, has gone into a body, or has no neighbours.
 pub fn find<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
-    volume: &[f64],
+    frame: &Frame<D>,
     time_step: f64,
 ) -> Option<Symptom> {
+    let volume = &frame.stencil.volume;
     let fastest = settings.velocity_limit.unwrap_or(f64::INFINITY).min(settings.particle_spacing / time_step);
     let largest = largest_volume(settings);
     let radius = settings.support_radius();
@@ -47,6 +52,10 @@ pub fn find<const D: usize>(
             if beyond > radius {
                 return symptom("position", beyond);
             }
+            let under = depth(particles, frame, i);
+            if under > DEEP * settings.particle_spacing {
+                return symptom("position", under);
+            }
             if volume[i] > largest {
                 return symptom("volume", volume[i]);
             }
@@ -62,6 +71,13 @@ fn largest_volume(settings: &Settings) -> f64 {
         Smoothing::<K>::new(settings.smoothing_length(), settings.dimensions).value(0.0)
     });
     1.0 / ((1.0 + LONELY) * own)
+}
+
+/// The least depth under the surface of a body that particle `i` can have, as the solid particles around it tell: a place
+/// at a distance from one is no less deep than it by more than that.
+fn depth<const D: usize>(particles: &Particles<D>, frame: &Frame<D>, i: usize) -> f64 {
+    let least = |j: usize| particles.depth[j] - (particles.position[j] - particles.position[i]).norm();
+    frame.stencil.neighbours.row(i).0.solid().iter().fold(0.0, |deepest: f64, entry| deepest.max(least(entry.j())))
 }
 
 /// How far `position` lies beyond the sides of the domain that particles cannot cross.
@@ -95,7 +111,7 @@ pub fn likely_cause<const D: usize>(
         );
     }
     match symptom.field {
-        "position" => "it has gone through a wall: take a smaller time step or a finer resolution".into(),
+        "position" => "it has gone through a wall or into a body: take a smaller time step or a finer resolution".into(),
         "volume" => "a void has opened around it: take a smaller time step, a finer resolution, or more shifting".into(),
         _ => format!(
             "{}: take a smaller time step, a smaller penalty constant or a finer resolution",

@@ -140,7 +140,7 @@ impl<const D: usize> Simulation<D> {
         let step = Step { settings: &self.settings, time_step, penalty, relaxation, dispersion };
 
         let outcome = self.scheme.iterate(step, &mut self.particles, &mut self.frame, &mut self.walls);
-        if let Some(symptom) = breakdown::find(step.settings, &self.particles, &self.frame.stencil.volume, time_step) {
+        if let Some(symptom) = breakdown::find(step.settings, &self.particles, &self.frame, time_step) {
             let error = self.diverged(symptom, time_step, velocity_max);
             self.restore_initial();
             return Err(error);

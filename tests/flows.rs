@@ -454,6 +454,23 @@ fn each_kind_of_breakdown_is_named_with_its_likely_cause() {
     let (field, message) = breakdown(&value, leaving);
     assert!(field == "position" && message.contains("through a wall"), "{message}");
 
+    // One that has got into a body; one that only touches its surface has not.
+    let value_of_body = common::settings_value::<2>(1.0 / 24.0, "periodic");
+    let touching = |depth: f64| {
+        let mut particles = common::cylinder(24, 4);
+        for i in (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Solid) {
+            particles.depth[i] = -common::distance(&particles.position[i]);
+        }
+        let first = common::fluid_near_cylinder(&particles, 1.0 / 24.0)[0];
+        particles.position[first] = Vector::from([0.5, 0.5 + common::RADIUS - depth / 24.0]);
+        particles
+    };
+    let (field, message) = breakdown(&value_of_body, touching(2.0));
+    assert!(field == "position" && message.contains("into a body"), "{message}");
+    let mut simulation =
+        Simulation::new(common::parse(&value_of_body), touching(0.1), Clock::default(), Some(2)).expect("valid");
+    simulation.advance(1, None).expect("stable");
+
     value["kinematic_viscosity"] = 1e300.into();
     value["adaptive_time_step"] = false.into();
     let (_, message) = breakdown(&value, taylor_green(24, 0.1));

@@ -299,6 +299,10 @@ def test_versions(two_checkpoints, tmp_path):
                 old.attrs[name] = value
     first = checkpoint.read(tmp_path / "old.h5")
     assert checkpoint.digest(first.state) == checkpoint.digest(found.state) and first.case is None
+    shutil.copytree(two_checkpoints, tmp_path / "old run")
+    shutil.copy(tmp_path / "old.h5", tmp_path / "old run" / "checkpoint.h5")
+    with pytest.warns(RuntimeWarning, match="of an older alsph, does not tell its settings"):
+        resume(tmp_path / "old run", until=found.state["time"] + 0.02, progress=False)
     file.write_bytes(file.read_bytes().replace(b"version 2", b"version 3"))
     with pytest.raises(RunFolderError, match="of version 3, and this alsph reads up to 2; use a newer alsph"):
         checkpoint.read(file)
@@ -354,14 +358,37 @@ def test_a_nested_configuration_is_no_crash(tmp_path, small):
         alsph.open_run(path)
 
 
+def path_of_damage(name):
+    """Return the name under which a damaged file is set aside."""
+    return "{}.damaged.{}".format(*name.split("."))
+
+
 @pytest.mark.parametrize("name", ["particles.vtkhdf", "surface.h5", "history.csv"])
 def test_a_damaged_file_is_set_aside(tmp_path, small, name):
     path = small.run(tmp_path / "run", until=0.2, output_interval=0.1, progress=False).path
     (path / name).write_bytes(b"text" + (path / name).read_bytes()[4:])
-    with pytest.warns(RuntimeWarning, match=f"{name} is damaged .* set aside as {name.split('.')[0]}.damaged"):
+    with pytest.warns(RuntimeWarning, match=f"{name} is damaged .* set aside as {path_of_damage(name)}"):
         resume(path, until=0.3, progress=False)
-    assert (path / f"{name.split('.')[0]}.damaged.{name.split('.')[1]}").exists()
+    assert (path / path_of_damage(name)).exists()
     assert alsph.open_run(path).snapshot().time >= 0.3
+
+
+@pytest.mark.parametrize("name", ["particles.vtkhdf", "surface.h5"])
+def test_a_file_that_is_damaged_in_mid_run_is_set_aside(tmp_path, small, name, monkeypatch):
+    path, run_until, damaged = tmp_path / "run", Simulation.run_until, path_of_damage(name)
+
+    def damage(self, *arguments):
+        file = path / name
+        if self.time > 0.15 and not (path / damaged).exists():
+            file.write_bytes(b"text" + file.read_bytes()[4:])
+        return run_until(self, *arguments)
+
+    monkeypatch.setattr(Simulation, "run_until", damage)
+    with pytest.warns(RuntimeWarning, match=f"{name} is damaged .* set aside as {damaged}"):
+        small.run(path, until=0.3, output_interval=0.1, surface_interval=0.05, progress=False)
+    run = alsph.open_run(path)
+    assert run.status == "finished" and run.snapshot().time >= 0.3
+    assert f"{name} is damaged" in (path / "run.log").read_text()
 
 
 def test_a_row_that_cannot_be_read_costs_no_other(tmp_path, small):
@@ -566,6 +593,30 @@ def test_a_state_that_differs_is_found(tmp_path, small):
     (path / "run.json").write_text("{}")
     with pytest.raises(RunFolderError, match="of an older alsph"):
         alsph.repeat(path, progress=False)
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        {"segments": [3]},
+        {"segments": [{"step": "0", "case": {}}]},
+        {"retries": ["again"]},
+        {"checkpoint": {"step": 1}},
+        {"checkpoint": {"step": 1, "time": 0.1, "state_sha256": 5}},
+    ],
+)
+def test_entries_of_another_kind_are_refused(tmp_path, small, entry):
+    path = small.run(tmp_path / "run", until=0.05, progress=False).path
+    (path / "run.json").write_text(json.dumps(RunFolder(path).info() | entry))
+    with pytest.raises(RunFolderError, match="an entry is not of its kind"):
+        alsph.repeat(path, progress=False)
+
+
+def test_a_damaged_history_differs(tmp_path, small):
+    path = small.run(tmp_path / "run", until=0.05, progress=False).path
+    lines = (path / "history.csv").read_text().splitlines(True)
+    (path / "history.csv").write_text("".join([*lines[:2], "nonsense" + lines[2], *lines[3:]]))
+    assert "step is 2, was nonsense2" in str(alsph.repeat(path, progress=False))
 
 
 @pytest.mark.parametrize("name", CASES)

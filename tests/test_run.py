@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from alsph import config, io
 from alsph.cases import Cylinder, TaylorGreen
-from alsph.errors import ConfigError, RunFolderError, SolverError
+from alsph.errors import ConfigError, Interrupted, RunFolderError, SolverError
 from alsph.run import Control, _interruptible, resume, start
+from alsph.simulation import Simulation
 
 HISTORY_COLUMNS = (
     "step time time_step iterations converged divergence_max divergence_mean divergence_sum velocity_max "
@@ -165,6 +166,40 @@ def test_a_run_that_is_going_on_is_left_alone(small, tmp_path):
         with pytest.raises(RunFolderError, match="is still running it"):
             small.run(folder.path, force=True)
     assert resume(folder.path, until=0.06, progress=False).status == "finished"
+
+
+def test_a_run_that_cannot_be_written_to_is_seen_going_on(tmp_path, monkeypatch):
+    folder = io.RunFolder(tmp_path / "run")
+
+    def is_busy():
+        def refuse(*_, **__):
+            raise PermissionError(13, "Permission denied")
+
+        with monkeypatch.context() as context:
+            context.setattr(io.filelock, "FileLock", refuse)
+            return folder.is_busy()
+
+    with folder.claimed():
+        assert is_busy()
+    assert not is_busy()
+
+
+@pytest.mark.parametrize("made_again", [False, True])
+def test_a_folder_that_is_removed_under_a_run_is_not_written_to(small, tmp_path, monkeypatch, made_again):
+    path, run_until = tmp_path / "run", Simulation.run_until
+
+    def removed(self, *arguments):
+        if (path / "case.toml").exists():
+            shutil.rmtree(path)
+        if made_again:
+            with io.RunFolder(path).claimed():
+                pass
+        return run_until(self, *arguments)
+
+    monkeypatch.setattr(Simulation, "run_until", removed)
+    with pytest.raises(RunFolderError, match="removed or replaced under the run"):
+        small.run(path, until=0.1, progress=False)
+    assert [file.name for file in path.glob("*")] == ([io.LOCK] if made_again else [])
 
 
 def test_run_in_a_thread(small, tmp_path):
@@ -322,8 +357,9 @@ def test_only_a_second_wish_to_stop_interrupts_at_once(monkeypatch):
         assert interrupted.is_set() and signals == [signal.SIGINT, signal.SIGINT]
         now = time.monotonic()
         monkeypatch.setattr(time, "monotonic", lambda: now + 2)
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
+        with pytest.raises(Interrupted) as caught:
+            signal.raise_signal(signal.SIGTERM)
+        assert caught.value.exit_code == 143
 
 
 @pytest.mark.filterwarnings("ignore:time_step")

@@ -16,7 +16,7 @@ from alsph import study
 from alsph.errors import ConfigError, WalltimeError
 from alsph.study import Figure, Study, Sweep
 from alsph.study.execution import _jobs
-from alsph.study.state import RUNS
+from alsph.study.state import RUNS, state
 
 DECAY = "decay rate of the kinetic energy, U/D"
 VORTEX = {"case": "taylor_green", "resolution": 16, "run": {"until": 0.2, "output_interval": 0.1}}
@@ -215,6 +215,7 @@ def test_a_run_that_another_study_makes_is_waited_for(tmp_path):
     path = tmp_path / RUNS / declare().points()[0].name
     other = subprocess.Popen([sys.executable, "-c", HOLDER, path], stdout=subprocess.PIPE)
     assert other.stdout.readline() == b"claimed\n"
+    assert state(path).status == "running"
     results = study.run(declare(), tmp_path, progress=False)
     assert other.wait() == 0, "the run was begun while the other one held its folder"
     assert results.complete

@@ -12,7 +12,7 @@ import struct
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import h5py
 
@@ -67,36 +67,69 @@ def growing(path: Path) -> Iterator[h5py.File]:
         overlay.commit()
 
 
+@contextmanager
+def viewing(path: Path) -> Iterator[h5py.File]:
+    """Open an HDF5 file to be read, as it will be once a change that was cut is completed; nothing is written."""
+    body = _pending(path)
+    if not body:
+        # Without a lock, so that a run that writes the file is not disturbed.
+        with h5py.File(path, "r", locking=False) as file:
+            yield file
+        return
+    with _Overlay(path, "rb") as overlay:
+        for offset, page in _pages(body):
+            overlay.seek(offset)
+            overlay.write(page)
+        with h5py.File(overlay, "r") as file:
+            yield file
+
+
 def recover(path: Path) -> None:
     """Complete a change of a file that was cut in the midst of it."""
-    journal = _journal(path)
-    if not journal.exists():
-        return
-    content = journal.read_bytes()
-    head = len(MAGIC) + 32
-    body = content[head:]
-    # A journal is complete, being renamed when it is on the disk, before the first page changes.
-    if path.exists() and content.startswith(MAGIC) and hashlib.sha256(body).digest() == content[len(MAGIC) : head]:
-        with suppress(struct.error, ValueError, OverflowError):  # a journal that others made
-            _apply(path, body)
-    journal.unlink()
+    if body := _pending(path):
+        _apply(path, body)
+    _journal(path).unlink(missing_ok=True)
 
 
 def _journal(path: Path) -> Path:
     return path.with_name(f".{path.name}.journal")
 
 
+def _pending(path: Path) -> bytes:
+    """Return what the journal of a file holds; nothing if there is none, or none that is whole and of the file."""
+    try:
+        content, end = _journal(path).read_bytes(), path.stat().st_size
+    except FileNotFoundError:
+        return b""
+    head = len(MAGIC) + 32
+    body = content[head:]
+    # A journal is complete, being renamed when it is on the disk, before the first page changes.
+    if not content.startswith(MAGIC) or hashlib.sha256(body).digest() != content[len(MAGIC) : head]:
+        return b""
+    with suppress(struct.error):  # a journal that others made
+        (size,) = struct.unpack_from("<Q", body)
+        if size <= end and all(offset + len(page) <= end for offset, page in _pages(body)):
+            return body
+    return b""
+
+
+def _pages(body: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield the offsets of the pages in a journal, and the pages."""
+    place = 8
+    while place < len(body):
+        offset, length = struct.unpack_from("<QQ", body, place)
+        place += 16
+        yield offset, body[place : place + length]
+        place += length
+
+
 def _apply(path: Path, body: bytes) -> None:
     """Write the pages in a journal into their file, and cut it to its new size; to do so twice does no harm."""
     (size,) = struct.unpack_from("<Q", body)
     with path.open("r+b") as file:
-        place = 8
-        while place < len(body):
-            offset, length = struct.unpack_from("<QQ", body, place)
-            place += 16
+        for offset, page in _pages(body):
             file.seek(offset)
-            file.write(body[place : place + length])
-            place += length
+            file.write(page)
         file.truncate(size)
         file.flush()
         os.fsync(file.fileno())
@@ -105,10 +138,10 @@ def _apply(path: Path, body: bytes) -> None:
 class _Overlay(io.RawIOBase):
     """A file whose changes are held in memory until :meth:`commit`."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, mode: Literal["rb", "r+b"] = "r+b") -> None:
         super().__init__()
         self._path = path
-        self._file = path.open("r+b", buffering=0)
+        self._file = path.open(mode, buffering=0)
         self._old = os.fstat(self._file.fileno()).st_size
         self._pages: dict[int, bytearray] = {}
         self._tail = bytearray()

@@ -9,9 +9,10 @@ import json
 import os
 import shutil
 import time as clock
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from alsph.checkpoint import Checkpoint
 from alsph.durable import flush, growing, replacing
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.geometry import FloatArray
-from alsph.reading import sound
+from alsph.reading import DAMAGE, sound
 
 AXES = ("x", "y", "z")
 LOCK = ".lock"
@@ -35,7 +36,7 @@ PATIENCE_SECONDS = 2.0
 """How long the lock of a folder is waited for: a killed process holds it while the system clears it away."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class RunFolder:
     """A run folder that is being written.
 
@@ -46,6 +47,7 @@ class RunFolder:
     """
 
     path: Path
+    _claim: os.stat_result | None = field(default=None, init=False, repr=False)
 
     def check_new(self, *, force: bool) -> None:
         """Check, without touching anything, that the folder can be created (or, with `force`, replaced)."""
@@ -74,9 +76,11 @@ class RunFolder:
                 lock.acquire()
             except filelock.Timeout:
                 raise RunFolderError(f"{self.path}: {self._holder()}; wait for it or stop it first") from None
+            self._claim = self._file(LOCK).stat()
         try:
             yield
         finally:
+            self._claim = None
             lock.release()
 
     def _check_entries(self) -> None:
@@ -97,7 +101,7 @@ class RunFolder:
         except filelock.Timeout:
             return True
         except OSError:  # a folder that can only be read
-            return False
+            return _is_locked(self._file(LOCK))
 
     def _holder(self) -> str:
         """Who is at work in the folder, in words."""
@@ -166,23 +170,21 @@ class RunFolder:
     def append_particles(self, time: float, particles: dict[str, NDArray[Any]]) -> None:
         """Append an output to ``particles.vtkhdf``."""
         self._make_room(size_of(particles))
-        with self._writing():
-            vtkhdf.append(self._file("particles.vtkhdf"), time, particles)
+        self._append("particles.vtkhdf", lambda path: vtkhdf.append(path, time, particles))
 
     def append_surface(self, time: FloatArray, angle: FloatArray, pressure_coefficient: FloatArray) -> None:
         """Append to ``surface.h5``: samples (k, m) of C_p at times (k,) and angles (m,) [degrees]."""
         self._make_room(pressure_coefficient.nbytes)
-        with self._writing(), growing(self._file("surface.h5")) as file:
-            if "time" not in file:
-                file["angle"] = angle
-                file.create_dataset(
-                    "pressure_coefficient", (0, len(angle)), float, maxshape=(None, len(angle)), chunks=(64, len(angle))
-                )
-                file.create_dataset("time", (0,), float, maxshape=(None,), chunks=(64,))
-            samples = len(file["time"])
-            for name, values in (("pressure_coefficient", pressure_coefficient), ("time", time)):
-                file[name].resize(samples + len(values), axis=0)
-                file[name][samples:] = values
+        self._append("surface.h5", lambda path: _append_surface(path, time, angle, pressure_coefficient))
+
+    def _append(self, name: str, append: Callable[[Path], None]) -> None:
+        """Append to a file; one that has been damaged since it was written last is set aside, and a new one begun."""
+        path = self._file(name)
+        with self._writing():
+            if remark := _unless_damaged(path, append):
+                self.log(f"warning: {remark}")
+                warnings.warn(f"{self.path}: {remark}", RuntimeWarning, stacklevel=2)
+                append(path)
 
     def write_breakdown(self, outputs: list[tuple[float, dict[str, NDArray[Any]]]]) -> Path:
         """Replace ``breakdown.vtkhdf``: the particles before and after the step that broke down."""
@@ -252,16 +254,8 @@ class RunFolder:
                 "surface.h5": lambda path: _truncate_surface(path, time),
             }
             for name, cut in parts.items():
-                path = self._file(name)
-                if not path.exists():
-                    continue
-                try:
-                    cut(path)
-                except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError) as error:
-                    if isinstance(error, OSError) and error.errno is not None:  # the disk's, not the file's
-                        raise
-                    path.replace(path.with_name(f"{path.stem}.damaged{path.suffix}"))
-                    damaged.append(f"{name} is damaged ({error}) and set aside as {path.stem}.damaged{path.suffix}")
+                if self._file(name).exists() and (remark := _unless_damaged(self._file(name), cut)):
+                    damaged.append(remark)
         return damaged
 
     def _file(self, name: str) -> Path:
@@ -285,10 +279,62 @@ class RunFolder:
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
+        if self._claim and not _is_still(self._claim, self._file(LOCK)):
+            raise RunFolderError(f"{self.path}: was removed or replaced under the run, which has nowhere to write to")
         try:
             yield
         except OSError as error:
             raise RunFolderError(f"{self.path}: cannot be written: {error}") from None
+
+
+def _is_still(stat: os.stat_result, path: Path) -> bool:
+    """Whether a path leads to the same file as before."""
+    try:
+        return os.path.samestat(stat, path.stat())
+    except FileNotFoundError:
+        return False
+
+
+def _unless_damaged(path: Path, change: Callable[[Path], None]) -> str:
+    """Change a file; if it is damaged, set it aside under another name and return what to say of it."""
+    there = path.exists()
+    try:
+        change(path)
+    except DAMAGE as error:
+        if not there or (isinstance(error, OSError) and error.errno is not None):  # the disk's, not the file's
+            raise
+        aside = path.with_name(f"{path.stem}.damaged{path.suffix}")
+        path.replace(aside)
+        return f"{path.name} is damaged ({error}) and set aside as {aside.name}"
+    return ""
+
+
+def _is_locked(path: Path) -> bool:
+    """Whether a process holds a lock, asked without the right to write, where the system knows such a question."""
+    try:
+        import fcntl
+
+        with path.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except (ImportError, OSError):
+        pass
+    return False
+
+
+def _append_surface(path: Path, time: FloatArray, angle: FloatArray, pressure_coefficient: FloatArray) -> None:
+    with growing(path) as file:
+        if "time" not in file:
+            file["angle"] = angle
+            file.create_dataset(
+                "pressure_coefficient", (0, len(angle)), float, maxshape=(None, len(angle)), chunks=(64, len(angle))
+            )
+            file.create_dataset("time", (0,), float, maxshape=(None,), chunks=(64,))
+        samples = len(file["time"])
+        for name, values in (("pressure_coefficient", pressure_coefficient), ("time", time)):
+            file[name].resize(samples + len(values), axis=0)
+            file[name][samples:] = values
 
 
 def _truncate_history(path: Path, last: int) -> None:

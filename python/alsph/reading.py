@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from alsph.durable import viewing
 from alsph.errors import RunFolderError
 from alsph.geometry import FloatArray, Kind
 
@@ -19,6 +20,9 @@ LARGEST_EXPANSION = 1032
 """Bytes that deflate makes of one byte at most."""
 
 FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
+
+DAMAGE = (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
+"""What the readers of HDF5 files raise at damaged ones."""
 
 SNAPSHOT_FIELDS = ("velocity", "pressure", "velocity_divergence", "vorticity", "kind")
 
@@ -89,13 +93,25 @@ def info(path: Path) -> dict[str, Any]:
         "machine": dict,
         "checkpoint": dict,
     }
-    parts = content.get("segments", [])
-    if any(name in content and not isinstance(content[name], kind) for name, kind in kinds.items()) or not all(
-        isinstance(part, dict) and isinstance(part.get("step"), int) and isinstance(part.get("case"), dict)
-        for part in parts
-    ):
+    tables: dict[str, dict[str, Any]] = {
+        "segments": {"step": int, "case": dict},
+        "retries": {"step": int, "time_step": (int, float)},
+        "checkpoint": {"step": int, "time": (int, float), "state_sha256": str},
+    }
+    found: list[tuple[Any, dict[str, Any], bool]] = [(content, kinds, False)]
+    for name, inner in tables.items():
+        parts = content.get(name, [])
+        found += [(part, inner, True) for part in (parts if isinstance(parts, list) else [parts])]
+    if not all(_of_kinds(table, inner, complete) for table, inner, complete in found):
         raise RunFolderError(f"{path}: damaged, an entry is not of its kind")
     return content
+
+
+def _of_kinds(table: Any, kinds: dict[str, Any], complete: bool) -> bool:
+    """Whether a table's entries are of their kinds and, if it is to be `complete`, all there."""
+    return isinstance(table, dict) and all(
+        isinstance(table[name], kind) if name in table else not complete for name, kind in kinds.items()
+    )
 
 
 def history(path: Path) -> dict[str, FloatArray]:
@@ -116,9 +132,8 @@ def history(path: Path) -> dict[str, FloatArray]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[h5py.File]:
-    """Open an HDF5 file without a lock, so that a run that writes it is not disturbed."""
-    with _refusing(path, OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError):
-        with h5py.File(path, "r", locking=False) as file:
+    with _refusing(path, *DAMAGE):
+        with viewing(path) as file:
             yield file
 
 

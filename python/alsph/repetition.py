@@ -1,6 +1,5 @@
 """Repeating a run: the same steps again, compared with what its folder holds."""
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -117,5 +116,9 @@ def _difference(names: list[str], then: str, now: list[str]) -> str:
     if len(was) != len(now):
         return f"step {now[0]}: not in the recorded history"
     index = next(k for k in range(len(now)) if was[k] != now[k])
-    change = abs(float(now[index]) - float(was[index])) if math.isfinite(float(was[index])) else math.nan
-    return f"step {now[0]}: {names[index]} is {now[index]}, was {was[index]} (by {change:.3g})"
+    name = names[index] if index < len(names) else f"column {index + 1}"
+    try:
+        change = f" (by {abs(float(now[index]) - float(was[index])):.3g})"
+    except ValueError:  # a damaged line
+        change = ""
+    return f"step {now[0]}: {name} is {now[index]}, was {was[index]}{change}"

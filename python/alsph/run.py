@@ -88,7 +88,7 @@ def complete(config: Config, path: Path, control: Control | None = None) -> Run:
         kept = folder.config()
         info = folder.last_info()
         # Retries shorten the time step: the run is still that of the case that it began with.
-        began = info["segments"][0]["case"] if info.get("retries") else kept.case_tables()
+        began = info["segments"][0]["case"] if info.get("retries") and info.get("segments") else kept.case_tables()
         if (began, kept.until) == (config.case_tables(), config.until):
             if info.get("status") == "finished":
                 return Run(path)
@@ -153,7 +153,9 @@ def _resume(folder: RunFolder, until: float | None, threads: int | None, control
                 folder.write_info(info | {"status": "finished"})
             return Run(folder.path)
         remarks = [saved.warning] if saved.warning else []
-        if changed := _changes(config, saved, folder):
+        if saved.case is None:
+            remarks.append("its checkpoint, of an older alsph, does not tell its settings: those in case.toml are used")
+        elif changed := _changes(config, saved, folder):
             remarks.append(f"goes on with other settings than before: {', '.join(changed)}")
         simulation = _restored(config, saved, folder)
         if saved.warning:
@@ -180,10 +182,11 @@ def _check_parameters(config: Config, folder: RunFolder) -> None:
 
 def _changes(now: Config, saved: Checkpoint, folder: RunFolder) -> list[str]:
     """Say how the case differs from the one that a checkpoint was made with."""
-    if saved.case is None or saved.case == now.case_tables():
+    then, tables = saved.case or {}, now.case_tables()
+    if then == tables:
         return []
     try:
-        before = config.from_tables(saved.case).case
+        before = config.from_tables(then).case
     except ConfigError as error:
         raise RunFolderError(f"{folder.path}: the case of its checkpoint cannot be used: {error}") from None
     old, new = (case.problem(saved.state).settings for case in (before, now.case))
@@ -192,9 +195,8 @@ def _changes(now: Config, saved: Checkpoint, folder: RunFolder) -> list[str]:
             f"{folder.path}/case.toml has been changed in what the particles were made for ({', '.join(fixed)}); "
             "undo the change, or start a new run"
         )
-    tables = now.case_tables()
-    names = [name for name in saved.case | tables if saved.case.get(name) != tables.get(name)]
-    return [f"{name} = {tables.get(name)} (was {saved.case.get(name)})" for name in names]
+    names = [name for name in then | tables if then.get(name) != tables.get(name)]
+    return [f"{name} = {tables.get(name)} (was {then.get(name)})" for name in names]
 
 
 def _restored(config: Config, saved: Checkpoint, folder: RunFolder) -> Simulation:
@@ -212,7 +214,9 @@ class _Driver:
         self.started = clock.monotonic() - float(info.get("seconds", 0))
         self.provenance = provenance(simulation.threads)
         self.segments: list[dict[str, Any]] = info.get("segments", [])
-        self.retries: list[dict[str, Any]] = info.get("retries", [])
+        # The last one has not taken effect if the process was killed between its note and the new time step.
+        retries: list[dict[str, Any]] = info.get("retries", [])
+        self.retries = [retry for retry in retries if retry["time_step"] >= config.case.time_step]
         self.rewound = False
         self.time_step = math.inf
         self.pause = 0.0
@@ -359,10 +363,11 @@ class _Driver:
         config, broke_down = Config(shorter, self.config.run), self.where
         self._go_on_with(config, _restored(config, saved, self.folder))
         self.rewound = True
-        self.folder.write_config(config)
         self.folder.truncate(self.simulation.step, self.simulation.time)
         self.retries = [retry for retry in self.retries if retry["step"] <= self.simulation.step]
         self.retries.append({"step": self.simulation.step, "time_step": shorter.time_step, "message": message})
+        self._write_status("running")
+        self.folder.write_config(config)
         self.folder.log(f"retry: back from {broke_down} to {self.where}, with time_step = {shorter.time_step:.4g}")
 
     def _write_status(self, status: str, message: str = "") -> None:
@@ -403,7 +408,7 @@ def _interruptible(event: threading.Event) -> Iterator[list[int]]:
     def handler(number: int, _frame: FrameType | None) -> None:
         nonlocal first
         if clock.monotonic() > first + 1.0:
-            raise KeyboardInterrupt
+            raise Interrupted("stopped at once; the run goes on from its last checkpoint", number)
         first = min(first, clock.monotonic())
         numbers.append(number)
         event.set()

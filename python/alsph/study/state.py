@@ -55,15 +55,10 @@ def state(path: Path) -> State:
         info = folder.info() if (path / "run.json").exists() else {}
     except RunFolderError as error:
         return State("failed", message=str(error))
-    if not info:
-        return State("waiting")
-    status, time = str(info.get("status")), float(info.get("time", 0.0))
-    if status == "running":
-        if folder.is_busy():
-            time = max(time, _last_time(path / "history.csv"))
-        else:
-            status = "stopped"
-    elif status == "interrupted":
+    status, time = str(info.get("status", "waiting")), float(info.get("time", 0.0))
+    if folder.is_busy():
+        status, time = "running", max(time, _last_time(path / "history.csv"))
+    elif status in ("running", "interrupted"):
         status = "stopped"
     return State(status, time, float(info.get("seconds", 0.0)), str(info.get("message", "")))
 
