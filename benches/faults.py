@@ -13,7 +13,6 @@ import resource
 import shutil
 import signal
 import statistics
-import subprocess
 import sys
 import tempfile
 import time as clock
@@ -22,10 +21,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import alsph
-import h5py
 from alsph import checkpoint
 from alsph.config import Config, RunSettings
 from alsph.io import RunFolder
+
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
+from processes import bits, command, wait_until_stepping
 
 CHANNEL = {"resolution": 8, "length": 5.0, "height": 4.0, "upstream": 2.0}
 CASES = {
@@ -34,7 +35,6 @@ CASES = {
     "Taylor-Green, 3-D": (alsph.cases.TaylorGreen(resolution=10, dimensions=3), 0.5),
 }
 OFTEN = {"output_interval": 0.02, "surface_interval": 0.01, "flush_seconds": 0.02}
-MAIN = [sys.executable, "-c", "from alsph.cli import main; main()"]
 
 
 @dataclass
@@ -44,32 +44,6 @@ class Tally:
     lost: list = field(default_factory=list)
     wrong: int = 0
     stuck: int = 0
-
-
-def bits(path):
-    """All that a run folder tells of the flow."""
-    found = [(path / "history.csv").read_text(), checkpoint.digest(RunFolder(path).read_checkpoint().state)]
-    for name in ("particles.vtkhdf", "surface.h5"):
-        if (path / name).exists():
-            with h5py.File(path / name) as file:
-                names = []
-                file.visit(names.append)
-                found += [file[key][()].tobytes() for key in names if isinstance(file[key], h5py.Dataset)]
-    return found
-
-
-def command(*arguments, **options):
-    return subprocess.Popen(
-        [*MAIN, *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, **options
-    )
-
-
-def wait_until_stepping(path, process):
-    while process.poll() is None:
-        info = RunFolder(path).last_info()
-        if (info.get("pid"), info.get("status")) == (process.pid, "running"):
-            return
-        clock.sleep(0.01)
 
 
 def last_step(path):

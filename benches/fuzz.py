@@ -24,6 +24,7 @@ from contextlib import suppress
 from pathlib import Path
 
 BATCH = 2000
+BATCH_SECONDS = 20
 MEMORY = 2 * 2**30
 EXTREMES = [
     b"0",
@@ -142,7 +143,10 @@ def work(folder, target, seeds):
     content = (folder / name).read_bytes()
     path = folder / f"damaged {name}"
     counts = Counter()
+    end = clock.monotonic() + BATCH_SECONDS
     for seed in seeds:
+        if clock.monotonic() > end:
+            break
         path.write_bytes(damage(content, random.Random(f"{target} {seed}")))
         print(json.dumps({"seed": seed}), flush=True)
         signal.alarm(10)

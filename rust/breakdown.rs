@@ -24,7 +24,8 @@ pub struct Symptom {
 }
 
 /// The first particle, if any, that has a value that is not finite, would cross more than Δx in a step, is faster than the
-/// velocity limit, has left the domain through a wall, has gone into a body, or has no neighbours.
+/// velocity limit, has left the domain through a wall, has gone into a body, or has no neighbours,
+/// or too few for a gradient.
 pub fn find<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
@@ -56,7 +57,7 @@ pub fn find<const D: usize>(
             if under > DEEP * settings.particle_spacing {
                 return symptom("position", under);
             }
-            if volume[i] > largest {
+            if volume[i] > largest || frame.stencil.correction[i].is_singular() {
                 return symptom("volume", volume[i]);
             }
         }

@@ -382,4 +382,9 @@ impl<const D: usize> Correction<D> {
         };
         Self { inverse, laplacian: -2.0 * (D as f64 + 2.0) / (2.0 + alpha.trace()), asymmetry: inverse * asymmetry }
     }
+
+    /// Whether α is singular: no tensor that is not has just the identity as its inverse, α being a sum in single precision.
+    pub fn is_singular(&self) -> bool {
+        self.inverse == Matrix::identity()
+    }
 }

@@ -18,7 +18,7 @@ import numpy as np
 
 from alsph.durable import replacing
 from alsph.errors import DamagedError, RunFolderError
-from alsph.reading import sound
+from alsph.reading import DAMAGE, sound
 
 VERSION = 2
 HEAD_BYTES = 512
@@ -92,7 +92,7 @@ def read(path: Path) -> Checkpoint:
         if not state.keys() >= {"time", "step", "position"}:
             raise ValueError("it has no time, step or position")
         return Checkpoint(state, case)
-    except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError) as error:
+    except DAMAGE as error:
         raise DamagedError(f"{path}: not a checkpoint, or damaged: {error}") from None
 
 

@@ -21,7 +21,7 @@ LARGEST_EXPANSION = 1032
 
 FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
 
-DAMAGE = (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
+DAMAGE = (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError, OverflowError)
 """What the readers of HDF5 files raise at damaged ones."""
 
 SNAPSHOT_FIELDS = ("velocity", "pressure", "velocity_divergence", "vorticity", "kind")
