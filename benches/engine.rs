@@ -79,7 +79,7 @@ fn stages(criterion: &mut Criterion) {
             });
         });
         group.bench_function(BenchmarkId::new("breakdown", count), |b| {
-            b.iter(|| black_box(breakdown::find(&settings, &particles, &stencil.volume, settings.time_step)));
+            b.iter(|| black_box(breakdown::find(&settings, &particles, &frame, settings.time_step)));
         });
         group.bench_function(BenchmarkId::new("velocity gradient", count), |b| {
             b.iter(|| {

@@ -385,6 +385,6 @@ impl<const D: usize> Correction<D> {
 
     /// Whether α is singular: no tensor that is not has just the identity as its inverse, α being a sum in single precision.
     pub fn is_singular(&self) -> bool {
-        self.inverse == Matrix::identity()
+        self.inverse == Matrix::<D>::identity()
     }
 }

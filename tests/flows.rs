@@ -444,6 +444,13 @@ fn each_kind_of_breakdown_is_named_with_its_likely_cause() {
     let distance: Vec<f64> = hollow.position.iter().map(|r| (r - centre).norm()).collect();
     let nearest = distance.iter().copied().fold(f64::INFINITY, f64::min);
     hollow.retain(&distance.iter().map(|&d| d == nearest || d > 0.25).collect::<Vec<_>>());
+    let (field, message) = breakdown(&value, hollow.clone());
+    assert!(field == "volume" && message.contains("a void has opened"), "{message}");
+
+    // Two there: neighbours of each other, but no gradient can be taken across.
+    let alone = hollow.position.iter().position(|r| (r - centre).norm() < 0.2).expect("one");
+    let other = if alone == 0 { 1 } else { 0 };
+    hollow.position[other] = hollow.position[alone] + Vector::from([1.0 / 24.0, 0.0]);
     let (field, message) = breakdown(&value, hollow);
     assert!(field == "volume" && message.contains("a void has opened"), "{message}");
 
