@@ -128,6 +128,52 @@ def journal_of(body):
     return durable.MAGIC + hashlib.sha256(body).digest() + body
 
 
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
+def test_an_exception_in_the_midst_of_a_write_leaves_the_old_file(tmp_path, monkeypatch, error):
+    """The HDF5 library does not bear one: it would go on with half of its state, or end the process when it closes."""
+    path = tmp_path / "table.h5"
+    for value in range(3):
+        grow(path, value)
+    content, touched, event = path.read_bytes(), _Overlay._touched, 0
+    while True:
+        left = event
+
+        def fail(self, start, end):
+            nonlocal left
+            left -= 1
+            if left == -1:
+                raise error
+            return touched(self, start, end)
+
+        with monkeypatch.context() as context:
+            context.setattr(_Overlay, "_touched", fail)
+            try:
+                grow(path, 3)
+            except error:
+                assert path.read_bytes() == content
+            else:
+                break
+        event += 1
+    assert event > 8 and len(rows(path)) == 4
+
+
+def test_a_change_that_shrinks_is_completed(tmp_path, monkeypatch):
+    path = tmp_path / "table.h5"
+    for value in range(40):
+        grow(path, value)
+    monkeypatch.setattr(Path, "unlink", lambda *_, **__: None)  # as if it were killed just before
+    with growing(path) as file:
+        file["table"].resize(3, axis=0)
+        file.attrs["rows"] = 3
+    monkeypatch.undo()
+    journal, content = durable._journal(path), path.read_bytes()
+    assert journal.exists() and durable._pending(path)
+    found = rows(path)
+    assert len(found) == 3
+    recover(path)
+    assert path.read_bytes() == content and not journal.exists()
+
+
 @pytest.mark.parametrize(
     "journal",
     [

@@ -565,6 +565,7 @@ def test_a_state_that_differs_is_found(tmp_path, small):
         {"retries": ["again"]},
         {"checkpoint": {"step": 1}},
         {"checkpoint": {"step": 1, "time": 0.1, "state_sha256": 5}},
+        {"began": 1},
     ],
 )
 def test_entries_of_another_kind_are_refused(tmp_path, small, entry):
@@ -574,11 +575,36 @@ def test_entries_of_another_kind_are_refused(tmp_path, small, entry):
         alsph.repeat(path, progress=False)
 
 
+def test_a_number_that_no_float_holds_is_refused(tmp_path, small):
+    path = small.run(tmp_path / "run", until=0.05, progress=False).path
+    text = (path / "run.json").read_text()
+    (path / "run.json").write_text(
+        text.replace("{", '{"seconds": 1' + 400 * "0" + ",", 1).replace('"seconds": 0', '"s": 0')
+    )
+    with pytest.raises(RunFolderError):
+        alsph.open_run(path)
+
+
+@pytest.mark.filterwarnings("ignore:.*expect divergence")
+def test_a_run_retried_from_its_start_is_complete(tmp_path, small):
+    settings = Config(small.replace(**UNSTABLE), RunSettings(until=0.3, output_interval=10))
+    start(settings, tmp_path / "run", Control(progress=False, retry=4))
+    info = RunFolder(tmp_path / "run").info()
+    assert info["retries"] and info["segments"][0]["step"] == 0
+    complete(settings, tmp_path / "run", Control(progress=False))
+    assert RunFolder(tmp_path / "run").info() == info
+
+
 def test_a_damaged_history_differs(tmp_path, small):
     path = small.run(tmp_path / "run", until=0.05, progress=False).path
     lines = (path / "history.csv").read_text().splitlines(True)
     (path / "history.csv").write_text("".join([*lines[:2], "nonsense" + lines[2], *lines[3:]]))
     assert "step is 2, was nonsense2" in str(alsph.repeat(path, progress=False))
+    (path / "history.csv").write_bytes(lines[0].encode() + b"\xff\n")
+    assert "not in the recorded history" in str(alsph.repeat(path, progress=False))
+    (path / "history.csv").unlink()
+    with pytest.raises(RunFolderError, match="history.csv is missing"):
+        alsph.repeat(path, progress=False)
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -5,11 +5,12 @@ A file is either replaced as a whole (:func:`replacing`) or, if it is an HDF5 fi
 written to a journal beside it, from which a change that was cut is completed.
 """
 
+import functools
 import hashlib
 import io
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Literal
@@ -62,8 +63,12 @@ def growing(path: Path) -> Iterator[h5py.File]:
             temporary.write_bytes(content.getbuffer())
         return
     with _Overlay(path) as overlay:
-        with h5py.File(overlay, "r+") as file:
-            yield file
+        try:
+            with h5py.File(overlay, "r+") as file:
+                yield file
+        finally:
+            if overlay.failure:
+                raise overlay.failure
         overlay.commit()
 
 
@@ -108,7 +113,9 @@ def _pending(path: Path) -> bytes:
         return b""
     with suppress(struct.error):  # a journal that others made
         (size,) = struct.unpack_from("<Q", body)
-        if size <= end and all(offset + len(page) <= end for offset, page in _pages(body)):
+        pages = [(offset, len(page)) for offset, page in _pages(body)]
+        aligned = all(offset % PAGE == 0 and 0 < length <= PAGE for offset, length in pages)
+        if size <= end and aligned and all(offset + length <= size for offset, length in pages):
             return body
     return b""
 
@@ -135,8 +142,22 @@ def _apply(path: Path, body: bytes) -> None:
         os.fsync(file.fileno())
 
 
+def _held(method: Callable[..., int]) -> Callable[..., int]:
+    """Have a method note what it raises, for :func:`growing` to raise: the HDF5 library does not bear it."""
+
+    @functools.wraps(method)
+    def call(self: "_Overlay", *arguments: Any) -> int:
+        try:
+            return method(self, *arguments)
+        except BaseException as error:
+            self.failure = self.failure or error
+            return 0
+
+    return call
+
+
 class _Overlay(io.RawIOBase):
-    """A file whose changes are held in memory until :meth:`commit`."""
+    """A file whose changes are held in memory until :meth:`commit`; `failure` is what a write raised, if any."""
 
     def __init__(self, path: Path, mode: Literal["rb", "r+b"] = "r+b") -> None:
         super().__init__()
@@ -147,7 +168,9 @@ class _Overlay(io.RawIOBase):
         self._tail = bytearray()
         self._end = self._old
         self._place = 0
+        self.failure: BaseException | None = None
 
+    @_held
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         base = {os.SEEK_SET: 0, os.SEEK_CUR: self._place, os.SEEK_END: self._end}[whence]
         self._place = base + offset
@@ -181,6 +204,7 @@ class _Overlay(io.RawIOBase):
         self._place = end
         return end - start
 
+    @_held
     def write(self, data: Any) -> int:
         view = memoryview(data).cast("B")
         start, end = self._place, self._place + len(view)
@@ -208,6 +232,7 @@ class _Overlay(io.RawIOBase):
             self._pages[offset] = bytearray(self._file.read(min(PAGE, self._old - offset)))
         return self._pages[offset]
 
+    @_held
     def truncate(self, size: int | None = None) -> int:
         self._end = self._place if size is None else size
         length = max(self._end - self._old, 0)
@@ -228,8 +253,10 @@ class _Overlay(io.RawIOBase):
             while written < len(self._tail):
                 written += self._file.write(memoryview(self._tail)[written:]) or 0
             os.fsync(self._file.fileno())
-            pages = (struct.pack("<QQ", offset, len(page)) + page for offset, page in sorted(self._pages.items()))
-            body = struct.pack("<Q", self._end) + b"".join(pages)
+            body = struct.pack("<Q", self._end)
+            for offset, page in sorted(self._pages.items()):
+                if kept := page[: max(self._end - offset, 0)]:
+                    body += struct.pack("<QQ", offset, len(kept)) + kept
             with replacing(_journal(self._path)) as temporary:
                 temporary.write_bytes(MAGIC + hashlib.sha256(body).digest() + body)
         except OSError:

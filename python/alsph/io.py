@@ -5,6 +5,7 @@ folder, which holds its lock; the files themselves are not locked, so that a vie
 """
 
 import csv
+import itertools
 import json
 import os
 import shutil
@@ -26,6 +27,11 @@ from alsph.durable import flush, growing, replacing
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.geometry import FloatArray
 from alsph.reading import DAMAGE, sound
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 AXES = ("x", "y", "z")
 LOCK = ".lock"
@@ -93,15 +99,19 @@ class RunFolder:
 
     def is_busy(self) -> bool:
         """Whether a living process, wherever it is, holds the folder."""
-        if not self._file(LOCK).exists():
-            return False
         try:
-            with filelock.FileLock(self._file(LOCK), timeout=0, fallback_to_soft=False):
-                return False
-        except filelock.Timeout:
+            if fcntl is None:
+                if self._file(LOCK).exists():
+                    with filelock.FileLock(self._file(LOCK), timeout=0, fallback_to_soft=False):
+                        pass
+            else:  # a lock that is shared with others who look, and needs no right to write
+                with self._file(LOCK).open("rb") as file:
+                    fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            return False
+        except (BlockingIOError, filelock.Timeout):
             return True
-        except OSError:  # a folder that can only be read
-            return _is_locked(self._file(LOCK))
+        except OSError:  # no lock, or none that can be read
+            return False
 
     def _holder(self) -> str:
         """Who is at work in the folder, in words."""
@@ -291,7 +301,7 @@ def _is_still(stat: os.stat_result, path: Path) -> bool:
     """Whether a path leads to the same file as before."""
     try:
         return os.path.samestat(stat, path.stat())
-    except FileNotFoundError:
+    except OSError:
         return False
 
 
@@ -303,24 +313,11 @@ def _unless_damaged(path: Path, change: Callable[[Path], None]) -> str:
     except DAMAGE as error:
         if not there or (isinstance(error, OSError) and error.errno is not None):  # the disk's, not the file's
             raise
-        aside = path.with_name(f"{path.stem}.damaged{path.suffix}")
+        names = (path.with_name(f"{path.stem}.damaged{number or ''}{path.suffix}") for number in itertools.count())
+        aside = next(name for name in names if not name.exists())
         path.replace(aside)
         return f"{path.name} is damaged ({error}) and set aside as {aside.name}"
     return ""
-
-
-def _is_locked(path: Path) -> bool:
-    """Whether a process holds a lock, asked without the right to write, where the system knows such a question."""
-    try:
-        import fcntl
-
-        with path.open("rb") as file:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except (ImportError, OSError):
-        pass
-    return False
 
 
 def _append_surface(path: Path, time: FloatArray, angle: FloatArray, pressure_coefficient: FloatArray) -> None:

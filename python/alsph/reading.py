@@ -92,6 +92,7 @@ def info(path: Path) -> dict[str, Any]:
         "retries": list,
         "machine": dict,
         "checkpoint": dict,
+        "began": dict,
     }
     tables: dict[str, dict[str, Any]] = {
         "segments": {"step": int, "case": dict},
@@ -102,6 +103,10 @@ def info(path: Path) -> dict[str, Any]:
     for name, inner in tables.items():
         parts = content.get(name, [])
         found += [(part, inner, True) for part in (parts if isinstance(parts, list) else [parts])]
+    with _refusing(path, OverflowError):
+        for table, _, _ in found:
+            numbers = [value for value in table.values() if isinstance(value, int)] if isinstance(table, dict) else []
+            max(map(float, numbers), default=0.0)  # whole numbers have no limit in JSON
     if not all(_of_kinds(table, inner, complete) for table, inner, complete in found):
         raise RunFolderError(f"{path}: damaged, an entry is not of its kind")
     return content

@@ -79,7 +79,9 @@ def repeat(path: str | Path, threads: int | None = None, *, progress: bool = Tru
     bodies = [body["name"] for body in simulation.problem.settings["bodies"]]
     recorded = folder.path / "history.csv"
     difference, until = "", parts[-1][1].until
-    with recorded.open(encoding="utf-8") as file, Reporter(until, 0.0, enabled=progress) as reporter:
+    if not recorded.is_file():
+        raise RunFolderError(f"{path}: {recorded.name} is missing, with which the repetition is compared")
+    with recorded.open(encoding="utf-8", errors="replace") as file, Reporter(until, 0.0, enabled=progress) as reporter:
         names = next(file, "").rstrip().split(",")
         ends = [*(step for step, _ in parts[1:]), int(info["checkpoint"]["step"])]
         for (_, part), end in zip(parts, ends, strict=True):

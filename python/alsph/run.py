@@ -88,7 +88,7 @@ def complete(config: Config, path: Path, control: Control | None = None) -> Run:
         kept = folder.config()
         info = folder.last_info()
         # Retries shorten the time step: the run is still that of the case that it began with.
-        began = info["segments"][0]["case"] if info.get("retries") and info.get("segments") else kept.case_tables()
+        began = info.get("began", {}) if info.get("retries") else kept.case_tables()
         if (began, kept.until) == (config.case_tables(), config.until):
             if info.get("status") == "finished":
                 return Run(path)
@@ -214,9 +214,11 @@ class _Driver:
         self.started = clock.monotonic() - float(info.get("seconds", 0))
         self.provenance = provenance(simulation.threads)
         self.segments: list[dict[str, Any]] = info.get("segments", [])
-        # The last one has not taken effect if the process was killed between its note and the new time step.
-        retries: list[dict[str, Any]] = info.get("retries", [])
-        self.retries = [retry for retry in retries if retry["time_step"] >= config.case.time_step]
+        self.retries: list[dict[str, Any]] = info.get("retries", [])
+        last = self.retries[-1] if self.retries else None
+        if last and last["step"] == simulation.step and last["time_step"] < config.case.time_step:
+            self.retries.pop()  # killed between its note and the new time step: it has not taken effect
+        self.began = info.get("began", config.case_tables()) if self.retries else config.case_tables()
         self.rewound = False
         self.time_step = math.inf
         self.pause = 0.0
@@ -251,7 +253,7 @@ class _Driver:
                 raise
             except BaseException as error:
                 with contextlib.suppress(AlsphError):
-                    self._write_status("failed", str(error))
+                    self._write_status("interrupted" if isinstance(error, Interrupted) else "failed", str(error))
                 raise
         if finished:
             return
@@ -384,6 +386,7 @@ class _Driver:
             "seconds": seconds,
             "peak_memory_bytes": peak_memory(),
             "pid": os.getpid(),
+            "began": self.began,
             "segments": self.segments,
             "retries": self.retries,
         }
@@ -408,7 +411,7 @@ def _interruptible(event: threading.Event) -> Iterator[list[int]]:
     def handler(number: int, _frame: FrameType | None) -> None:
         nonlocal first
         if clock.monotonic() > first + 1.0:
-            raise Interrupted("stopped at once; the run goes on from its last checkpoint", number)
+            raise Interrupted("stopped at once; `alsph resume` goes on from the last checkpoint", number)
         first = min(first, clock.monotonic())
         numbers.append(number)
         event.set()
