@@ -1,5 +1,6 @@
 """Files that a cut never leaves half-written."""
 
+import errno
 import hashlib
 import io
 import os
@@ -155,6 +156,19 @@ def test_an_exception_in_the_midst_of_a_write_leaves_the_old_file(tmp_path, monk
                 break
         event += 1
     assert event > 8 and len(rows(path)) == 4
+
+
+def test_a_disk_that_cannot_be_read_is_not_a_damaged_file(tmp_path, monkeypatch):
+    path = tmp_path / "table.h5"
+    grow(path, 0)
+
+    def fail(self, start, end):
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(_Overlay, "_touched", fail)
+    with pytest.raises(OSError, match="Input/output error") as caught:
+        grow(path, 1)
+    assert caught.value.errno == errno.EIO
 
 
 def test_a_change_that_shrinks_is_completed(tmp_path, monkeypatch):

@@ -189,6 +189,13 @@ class _Overlay(io.RawIOBase):
         return True
 
     def readinto(self, buffer: Any) -> int:
+        try:
+            return self._readinto(buffer)
+        except BaseException as error:  # the library would put one of its own in its place
+            self.failure = self.failure or error
+            raise
+
+    def _readinto(self, buffer: Any) -> int:
         view = memoryview(buffer).cast("B")
         start, end = self._place, max(min(self._place + len(view), self._end), self._place)
         self._file.seek(start)
