@@ -6,6 +6,8 @@ import io
 import os
 import signal
 import struct
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -169,6 +171,29 @@ def test_a_disk_that_cannot_be_read_is_not_a_damaged_file(tmp_path, monkeypatch)
     with pytest.raises(OSError, match="Input/output error") as caught:
         grow(path, 1)
     assert caught.value.errno == errno.EIO
+
+
+def test_a_process_ends_well_after_a_file_that_hdf5_cannot_close(tmp_path):
+    """The library would flush what it has of the file after Python's end, and crash."""
+    path = tmp_path / "table.h5"
+    grow(path, 0)
+    script = """
+import sys
+from pathlib import Path
+from alsph.durable import _Overlay, growing
+
+def fail(self, start, end):
+    raise MemoryError
+
+_Overlay._touched = fail
+try:
+    with growing(Path(sys.argv[1])):
+        pass
+except MemoryError:
+    print("raised")
+"""
+    done = subprocess.run([sys.executable, "-c", script, path], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "raised\n"), done.stderr
 
 
 def test_a_change_that_shrinks_is_completed(tmp_path, monkeypatch):

@@ -5,10 +5,13 @@ A file is either replaced as a whole (:func:`replacing`) or, if it is an HDF5 fi
 written to a journal beside it, from which a change that was cut is completed.
 """
 
+import atexit
+import ctypes
 import functools
 import hashlib
 import io
 import os
+import re
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -63,12 +66,8 @@ def growing(path: Path) -> Iterator[h5py.File]:
             temporary.write_bytes(content.getbuffer())
         return
     with _Overlay(path) as overlay:
-        try:
-            with h5py.File(overlay, "r+") as file:
-                yield file
-        finally:
-            if overlay.failure:
-                raise overlay.failure
+        with _opened(overlay, "r+") as file:
+            yield file
         overlay.commit()
 
 
@@ -85,8 +84,30 @@ def viewing(path: Path) -> Iterator[h5py.File]:
         for offset, page in _pages(body):
             overlay.seek(offset)
             overlay.write(page)
-        with h5py.File(overlay, "r") as file:
+        with _opened(overlay, "r") as file:
             yield file
+
+
+@contextmanager
+def _opened(overlay: "_Overlay", mode: str) -> Iterator[h5py.File]:
+    """Open what an overlay shows as an HDF5 file; raises what reading or writing it raised."""
+    try:
+        with h5py.File(overlay, mode) as file:
+            yield file
+    except BaseException as error:
+        overlay.failure = overlay.failure or error
+    if overlay.failure:
+        atexit.unregister(_close_library)
+        atexit.register(_close_library)
+        raise overlay.failure
+
+
+def _close_library() -> None:
+    """End the HDF5 library before Python ends: a damaged file that it could not close would crash the process after."""
+    maps = Path("/proc/self/maps")  # elsewhere than on Linux the process may crash once all is done
+    names = re.findall(r"/.*/libhdf5[-.][^/\n]*$", maps.read_text() if maps.exists() else "", re.MULTILINE)
+    for name in set(names):
+        ctypes.CDLL(name).H5close()
 
 
 def recover(path: Path) -> None:
@@ -143,7 +164,7 @@ def _apply(path: Path, body: bytes) -> None:
 
 
 def _held(method: Callable[..., int]) -> Callable[..., int]:
-    """Have a method note what it raises, for :func:`growing` to raise: the HDF5 library does not bear it."""
+    """Have a method note what it raises, to be raised when the file is closed: the HDF5 library does not bear it."""
 
     @functools.wraps(method)
     def call(self: "_Overlay", *arguments: Any) -> int:
@@ -157,7 +178,7 @@ def _held(method: Callable[..., int]) -> Callable[..., int]:
 
 
 class _Overlay(io.RawIOBase):
-    """A file whose changes are held in memory until :meth:`commit`; `failure` is what a write raised, if any."""
+    """A file whose changes are held in memory until :meth:`commit`; `failure` is what it raised, if anything."""
 
     def __init__(self, path: Path, mode: Literal["rb", "r+b"] = "r+b") -> None:
         super().__init__()
@@ -189,14 +210,12 @@ class _Overlay(io.RawIOBase):
         return True
 
     def readinto(self, buffer: Any) -> int:
-        try:
-            return self._readinto(buffer)
-        except BaseException as error:  # the library would put one of its own in its place
-            self.failure = self.failure or error
-            raise
-
-    def _readinto(self, buffer: Any) -> int:
         view = memoryview(buffer).cast("B")
+        view[:] = bytes(len(view))  # for what the file does not hold, or a disk does not give
+        return self._read_into(view)
+
+    @_held
+    def _read_into(self, view: memoryview) -> int:
         start, end = self._place, max(min(self._place + len(view), self._end), self._place)
         self._file.seek(start)
         read = 0
