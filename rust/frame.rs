@@ -19,7 +19,15 @@ pub struct Travel {
 
 /// Part of u_max Δt by which two particles may approach each other beyond what their velocities at r^n make them, before the
 /// neighbours are searched again: what acceleration within the step adds.
-const SKIN: f64 = 0.4;
+const SKIN: f64 = 0.1;
+
+/// How far in Δx the frame may be from the positions that an iteration of Algorithm 1 has reached. The later iterations move
+/// particles by less, and the derivatives by as little as that part of what sets Algorithms 1 and 2 apart, a whole u Δt.
+const FRAME_TOLERANCE: f64 = 1e-5;
+
+/// Reach in Δx of the grid whose order the particles are put into: its cells of 2 Δx hold whole clusters where particles lie on a
+/// lattice, and nearly so elsewhere.
+const CLUSTER_REACH: f64 = 4.0;
 
 #[derive(Debug, Default)]
 pub struct Frame<const D: usize> {
@@ -48,7 +56,7 @@ impl<const D: usize> Frame<D> {
         self.reach = search_radius(settings) + self.skin + if lasts { 2.0 * distance } else { 0.0 };
         particles.drop_images();
         if reorder {
-            self.grid.build(&particles.position, self.reach, settings.bounds());
+            self.grid.build(&particles.position, CLUSTER_REACH * settings.particle_spacing, settings.bounds());
             particles.reorder(self.grid.order());
         }
         // Images that come within reach during the step, too.
@@ -78,11 +86,14 @@ impl<const D: usize> Frame<D> {
         self.evaluate(settings, particles);
     }
 
-    /// Evaluate the stencil again after particles (and images) have moved within the step.
+    /// Evaluate the stencil again after particles (and images) have moved within the step. A frame that lasts is kept while it is
+    /// within [`FRAME_TOLERANCE`] of where they are.
     pub fn update(&mut self, settings: &Settings, particles: &Particles<D>) {
         if self.expected.is_empty() {
             self.list_neighbours(settings, particles);
-        } else if self.is_stale(particles) {
+        } else if !farther(&self.stencil.position, particles, FRAME_TOLERANCE * settings.particle_spacing) {
+            return;
+        } else if farther(&self.expected, particles, 0.5 * self.skin) {
             self.expected.copy_from_slice(&particles.position);
             self.list_neighbours(settings, particles);
         }
@@ -95,16 +106,16 @@ impl<const D: usize> Frame<D> {
         self.stencil.neighbours.search(particles, expected, &self.grid, search_radius(settings) + self.skin);
     }
 
-    fn is_stale(&self, particles: &Particles<D>) -> bool {
-        let limit = (0.5 * self.skin).powi(2);
-        let moved = self.expected[..particles.real].par_iter().zip(&particles.position).with_min_len(CHUNK);
-        moved.any(|(expected, position)| (position - expected).norm_squared() > limit)
-    }
-
     fn evaluate(&mut self, settings: &Settings, particles: &Particles<D>) {
         let images = &self.images;
         self.stencil.evaluate(settings, particles, |volume| images.scalars(volume));
     }
+}
+
+/// Whether any particle is farther than `distance` from its position in `from`.
+fn farther<const D: usize>(from: &[Vector<D>], particles: &Particles<D>, distance: f64) -> bool {
+    let positions = from[..particles.real].par_iter().zip(&particles.position).with_min_len(CHUNK);
+    positions.into_par_iter().any(|(from, position)| (position - from).norm_squared() > distance * distance)
 }
 
 /// A hair more than what counts as a neighbour, so that the list is complete whatever rounding does.

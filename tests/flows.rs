@@ -61,6 +61,25 @@ fn taylor_green_decays_as_the_exact_solution() {
     }
 }
 
+#[test]
+fn algorithm_1_is_the_original_method_but_for_what_its_frame_tolerates() {
+    // Five steps of disordered particles: a step of their own sets the algorithms apart by 1e-3.
+    let after = |algorithm| {
+        let settings = with_algorithm(common::settings_value::<2>(1.0 / 32.0, "periodic"), algorithm);
+        let mut simulation = Simulation::new(settings, taylor_green(32, 0.1), Clock::default(), Some(1)).expect("valid");
+        simulation.advance(5, None).expect("stable");
+        let (particles, identity) = (simulation.particles(), |i: &usize| simulation.particles().id[*i]);
+        let mut order: Vec<usize> = (0..particles.real).collect();
+        order.sort_by_key(identity);
+        order.into_iter().map(|i| particles.velocity[i]).collect::<Vec<_>>()
+    };
+    let difference = |a: &[Vector<2>], b: &[Vector<2>]| a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    let [updated, original, initial] =
+        [("updated", false, 0), ("updated", true, 0), ("initial", false, 0)].map(|algorithm| after(algorithm));
+    let (tolerated, algorithms) = (difference(&updated, &original), difference(&initial, &original));
+    assert!(tolerated < 1e-5 && algorithms > 100.0 * tolerated, "{tolerated:.1e}, {algorithms:.1e}");
+}
+
 /// Error of the decay rate of the velocity of Taylor-Green vortices, over the exact rate, in the first tenth of a time unit.
 fn error_of_decay(frame: &'static str, time_step: f64) -> f64 {
     let mut value = common::settings_value::<2>(1.0 / 32.0, "periodic");

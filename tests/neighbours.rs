@@ -160,3 +160,20 @@ fn far_strays_cost_no_memory() {
     let radius = settings.support_radius();
     assert_eq!(listed(&frame, &particles, radius), brute_force_neighbours(&particles.position, particles.real, radius));
 }
+
+#[test]
+fn a_frame_is_evaluated_again_once_a_particle_has_moved_by_more_than_its_tolerance() {
+    for (search_every_iteration, moved, kept) in [(false, 0.9e-5, true), (false, 1.1e-5, false), (true, 0.9e-5, false)] {
+        let mut value = common::settings_value::<2>(0.1, "periodic");
+        (value["derivative_frame"], value["search_every_iteration"]) = ("updated".into(), search_every_iteration.into());
+        let settings = common::parse(&value);
+        let mut particles = common::particles(common::lattice::<2>(12, 0.3));
+        let mut frame = Frame::default();
+        frame.search(&settings, &mut particles, Travel { time_step: 1.0, velocity_max: 0.005, fraction: 0.0 }, true);
+        let before = frame.stencil.position.clone();
+        particles.position[7][0] += 0.1 * moved;
+        frame.update(&settings, &particles);
+        assert_eq!(frame.stencil.position == before, kept, "search {search_every_iteration}, moved {moved} spacings");
+        assert!(kept || frame.stencil.position == particles.position);
+    }
+}
