@@ -6,8 +6,9 @@ use alsph::settings::Settings;
 #[path = "../../tests/common/mod.rs"]
 mod common;
 
-/// A way of taking a step, and the passes over all pairs that it has.
+/// A way of taking a step, and the passes over all pairs that it has. No bench reads all of it.
 #[derive(Clone, Copy)]
+#[allow(dead_code)]
 pub struct Method {
     pub name: &'static str,
     derivative_frame: &'static str,
