@@ -238,15 +238,16 @@ def test_never_more_threads_than_cores():
 
 # Interruption
 
-LONG = {"case": "taylor_green", "resolution": 36, "run": {"until": 0.6, "output_interval": 0.05}}
+# Long enough that a busy machine does not end it before it is interrupted.
+LONG = {"case": "taylor_green", "resolution": 36, "run": {"until": 1.5, "output_interval": 0.25}}
 LONG_TOML = """
 name = "long"
 [base]
 case = "taylor_green"
 resolution = 36
 [base.run]
-until = 0.6
-output_interval = 0.05
+until = 1.5
+output_interval = 0.25
 [sweep.product]
 reynolds = [50, 100]
 """
