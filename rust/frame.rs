@@ -21,8 +21,8 @@ pub struct Travel {
 /// neighbours are searched again: what acceleration within the step adds.
 const SKIN: f64 = 0.1;
 
-/// How far in Δx the frame may be from the positions that an iteration of Algorithm 1 has reached. The later iterations move
-/// particles by less, and the derivatives by as little as that part of what sets Algorithms 1 and 2 apart, a whole u Δt.
+/// How far in Δx the frame may be from the positions that an iteration of Algorithm 1 has reached: later iterations move particles
+/// by less. Algorithms 1 and 2 are apart by u Δt, some thousand times as much.
 const FRAME_TOLERANCE: f64 = 1e-5;
 
 /// Reach in Δx of the grid whose order the particles are put into: its cells of 2 Δx hold whole clusters where particles lie on a
@@ -115,7 +115,7 @@ impl<const D: usize> Frame<D> {
 /// Whether any particle is farther than `distance` from its position in `from`.
 fn farther<const D: usize>(from: &[Vector<D>], particles: &Particles<D>, distance: f64) -> bool {
     let positions = from[..particles.real].par_iter().zip(&particles.position).with_min_len(CHUNK);
-    positions.into_par_iter().any(|(from, position)| (position - from).norm_squared() > distance * distance)
+    positions.any(|(from, position)| (position - from).norm_squared() > distance * distance)
 }
 
 /// A hair more than what counts as a neighbour, so that the list is complete whatever rounding does.
