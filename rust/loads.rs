@@ -1,9 +1,11 @@
 //! Force and torque of the fluid on each body.
 //!
 //! The pressure acts through Σ_s Σ_f V_s V_f (p_s + p_f) ∇_s W_sf over solid s and fluid f, the viscous stress through the
-//! compact Laplacian of the same pairs. Both are antisymmetric, so the solid's own pairs cancel and only fluid neighbours count.
+//! compact Laplacian of the same pairs. Both are antisymmetric, so the solid's own pairs cancel and only fluid neighbours count. Their
+//! sum is the momentum that the fluid gives. The viscous pairs feel the slope of the velocity over the width of a kernel. Where
+//! the velocity's slope at the surface is known, the viscous part is its shear, in the same sum, and the pressure part the rest.
 
-use crate::boundary::Walls;
+use crate::boundary::{Walls, for_each_height};
 use crate::frame::Frame;
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
@@ -94,6 +96,15 @@ fn force_on<const D: usize>(
         let dispersion = |i: usize| walls.dispersion.get(i).copied().unwrap_or_else(Vector::zeros);
         let relative = (particles.velocity[f] - dispersion(f)) - (walls.seen_by(particles, s, f) - dispersion(s));
         viscous += relative * (-slope * 2.0 * viscosity);
+    }
+    if let Some(&Some(gradient)) = walls.slope.get(s) {
+        let mut area = 0.0;
+        for_each_height(settings, particles, stencil, s, |slope, height| {
+            area -= slope * 2.0 * (height + particles.depth[s]);
+        });
+        let shear = gradient * (viscosity * area);
+        pressure += viscous - shear;
+        viscous = shear;
     }
     (pressure * stencil.volume[s], viscous * stencil.volume[s])
 }

@@ -1,6 +1,7 @@
 //! What solid particles show to the viscous term, and its fourth order.
 
 use alsph::boundary::Walls;
+use alsph::loads::{Load, loads};
 use alsph::operators::LaplacianAndGradient;
 use alsph::{ParticleKind, Vector};
 use approx::assert_relative_eq;
@@ -17,8 +18,9 @@ fn cubic(n: f64) -> f64 {
 }
 
 /// Disordered particles in the unit box, solid where the height that `surface` gives with the normal is negative, the fluid with the
-/// cubic's velocity. Returns for solid particles less than Δx deep away from the box's sides their depth [Δx] and what they show.
-fn shown<const D: usize>(side: usize, surface: impl Fn(&Vector<D>) -> (f64, Vector<D>)) -> Vec<(f64, Vector<D>)> {
+/// cubic's velocity. Returns for solid particles less than Δx deep away from the box's sides their depth [Δx] and what they show, and the
+/// load on them.
+fn shown<const D: usize>(side: usize, surface: impl Fn(&Vector<D>) -> (f64, Vector<D>)) -> (Vec<(f64, Vector<D>)>, Load<D>) {
     let spacing = 1.0 / side as f64;
     let mut value = common::settings_value::<D>(spacing, "none");
     value["wall_velocity"] = "cubic".into();
@@ -43,25 +45,32 @@ fn shown<const D: usize>(side: usize, surface: impl Fn(&Vector<D>) -> (f64, Vect
     let solids = (0..set.particles.real).filter(near).filter(|&i| inside(&set.particles.position[i]));
     let shown: Vec<_> = solids.map(|i| (set.particles.depth[i] / spacing, walls.viscous_velocity[i])).collect();
     assert!(shown.len() > 20);
-    shown
+    (shown, loads(&settings, &set.particles, &set.frame, &walls)[0])
 }
 
 /// A cubic profile goes on into the solid particles, in 2-D and 3-D, over a plane and over a cylinder. An odd mirror image would
 /// be 15 to 30 % off.
 #[test]
 fn solids_show_the_cubic_of_the_fluid_above() {
-    let plane = shown::<2>(40, |x| (x[1] - 0.5, Vector::y()));
+    let (plane, _) = shown::<2>(40, |x| (x[1] - 0.5, Vector::y()));
     let plane = plane.into_iter().map(|(depth, u)| (depth, u[0], u[1]));
-    let upright = shown::<3>(24, |x| (x[2] - 0.5, Vector::z()));
+    let (upright, _) = shown::<3>(24, |x| (x[2] - 0.5, Vector::z()));
     let upright = upright.into_iter().map(|(depth, u)| (depth, u[0], u[2]));
     for (depth, along, across) in plane.chain(upright) {
         assert_relative_eq!(along - WALL_VELOCITY, cubic(-depth), max_relative = 0.06);
         assert_relative_eq!(across - WALL_VELOCITY, -0.5 * cubic(-depth), max_relative = 0.06);
     }
     let centre = Vector::from([0.5, 0.5]);
-    for (depth, u) in shown::<2>(60, |x| ((x - centre).norm() - 0.2, (x - centre).normalize())) {
+    let (around, load) = shown::<2>(60, |x| ((x - centre).norm() - 0.2, (x - centre).normalize()));
+    for (depth, u) in around {
         assert_relative_eq!(u[0] - WALL_VELOCITY, cubic(-depth), max_relative = 0.08);
     }
+    // The friction is that of the slope at the surface, 2 per Δx, all around; there is no pressure, and what the pairs exchange beyond
+    // the friction is small.
+    let friction = 0.01 * 2.0 * 60.0 * (2.0 * PI * 0.2);
+    assert_relative_eq!(load.viscous_force[0], friction, max_relative = 0.03);
+    assert_relative_eq!(load.viscous_force[1], -0.5 * friction, max_relative = 0.03);
+    assert!(load.pressure_force.norm() < 0.15 * friction, "{}", load.pressure_force);
 }
 
 /// Relative error of the viscous term of a wave `length` Δx long.

@@ -34,11 +34,13 @@ parser.add_argument("--algorithm", type=int, help="the paper's; in the middle of
 parser.add_argument("--paper", action="store_true", help="five iterations, no sweeps, a viscous term of second order")
 parser.add_argument("--steps", type=int, default=20, help="steps to time, of the cylinder")
 parser.add_argument("--until", type=float, default=1.0, help="time to reach, of the vortex")
+parser.add_argument("--perturb", type=float, default=0, help="width of the vortex's random displacement, Δx")
 options = parser.parse_args()
 
 WARM_UP = 5
 algorithm = options.algorithm or (2 if options.paper else "midpoint")
-result = {"code": f"alsph, {algorithm}{', the paper' if options.paper else ''}"}
+code = ["alsph", str(algorithm), *["the paper"] * options.paper, *["perturbed"] * bool(options.perturb)]
+result = {"code": ", ".join(code)}
 method = {"resolution": options.resolution, "algorithm": algorithm}
 if options.paper:
     method |= {"max_iterations": 5, "projection_sweeps": 0, "viscous_order": 2}
@@ -50,7 +52,7 @@ if options.case == "cylinder":
         simulation.advance(1)
         cpu.append(time.process_time())
 else:
-    case = alsph.cases.TaylorGreen(reynolds=100, **method)
+    case = alsph.cases.TaylorGreen(reynolds=100, perturbation=options.perturb / 2, **method)
     simulation = case.simulation(threads=1)
     while simulation.time < options.until:
         simulation.advance(1)

@@ -95,6 +95,7 @@ parser.add_argument("--smoothing-ratio", type=float, default=4 / 3)
 parser.add_argument("--steps", type=int, default=20, help="steps to time, of the cylinder")
 parser.add_argument("--until", type=float, default=1.0, help="time to reach, of the vortex")
 parser.add_argument("--scheme", default="edac")
+parser.add_argument("--perturb", type=float, default=0, help="width of the vortex's random displacement, Δx")
 parser.add_argument("--cache", action="store_true")
 parser.add_argument("--output", default="pysph_output")
 options = parser.parse_args()
@@ -104,7 +105,8 @@ clock = Clock()
 arguments = [f"--nx={options.resolution}", f"--hdx={options.smoothing_ratio}", f"--directory={options.output}"]
 if options.case == "taylor_green":
     app = TaylorGreen()
-    arguments += [f"--scheme={options.scheme}", f"--tf={options.until}", "--pfreq=1000000"]
+    arguments += [f"--scheme={options.scheme}", f"--tf={options.until}", f"--perturb={options.perturb}"]
+    arguments += ["--pfreq=1000000"]
 else:
     app = Cylinder()
     arguments += [f"--max-steps={WARM_UP + options.steps}", "--disable-output"]
@@ -116,7 +118,9 @@ unit, period = (app.dc, None) if options.case == "cylinder" else (1.0, 1.0)
 found = loops(solver.acceleration_evals[0])
 fluid = solver.particles[0]
 result = {
-    "code": f"PySPH {options.scheme.upper()}" + (", cached neighbours" if options.cache else ""),
+    "code": f"PySPH {options.scheme.upper()}"
+    + (", cached neighbours" if options.cache else "")
+    + (", perturbed" if options.perturb else ""),
     "particles": sum(int(np.sum(array.tag == 0)) for array in solver.particles),
     "smoothing_ratio": options.smoothing_ratio,
     "neighbours": pairs(solver, "fluid", "fluid", period) / np.sum(fluid.tag == 0) - 1,

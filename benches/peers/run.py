@@ -44,6 +44,16 @@ CASES = {
         ("pysph", ["taylor_green", "--resolution=50", "--scheme=sisph", "--cache", "--smoothing-ratio=1"]),
         ("jax-sph", ["taylor_green", "--resolution=50"]),
     ],
+    # The errors rather than the speed: a finer lattice, and particles that start in disorder.
+    "accuracy": [
+        (code, ["taylor_green", *start, *scheme])
+        for start in (["--resolution=100"], ["--resolution=50", "--perturb=0.2"], ["--resolution=100", "--perturb=0.2"])
+        for code, *scheme in (
+            ("alsph",),
+            ("pysph", "--scheme=edac", "--cache", "--smoothing-ratio=1"),
+            ("pysph", "--scheme=tvf", "--cache", "--smoothing-ratio=1"),
+        )
+    ],
 }
 
 

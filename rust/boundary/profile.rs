@@ -1,8 +1,9 @@
 //! Profiles of the fluid over a wall, continued into its solid particles.
 //!
-//! At each solid particle under the surface a polynomial in the height over the surface is fitted to the fluid around, and the
+//! At each solid particle under the surface a polynomial in the height over the surface is fitted to the fluid above it, and the
 //! solid particles below take its values at their depths. So the compact Laplacian sees a field that is smooth across the surface; an
-//! odd mirror image, which Shepard averages amount to, turns the sign of the curvature there and halves it in the first layer.
+//! odd mirror image, which Shepard averages amount to, turns the sign of the curvature there and halves it in the first layer. The
+//! slope of the velocity at the surface is the wall's shear.
 
 use crate::boundary::solid::for_each_weighted;
 use crate::parallel;
@@ -18,25 +19,46 @@ const SURFACE_DEPTH: f64 = 0.75;
 /// Least product of two unit normals on one piece of wall: corners of more than 45 degrees part it.
 const SAME_WALL: f64 = 0.7;
 
-/// Keeps coefficients after the first small where the fluid does not tell of them, as in a single layer.
-const RIDGE: f64 = 1e-3;
+/// Keeps coefficients after the first small where the fluid does not tell of them, as in a single layer, and no more: 1e-3 made the
+/// curvature next to a wall a fifth too small.
+const RIDGE: f64 = 1e-5;
 
-/// Values that `field` would have at the solid particles if it went on below the surface as above it: `base(s)` and what the
-/// least-squares fit of `basis`, K functions of the height over Δx, says of `field − base(s)`. Solid particles that are under no fluid
-/// or have no normals get `base(s)`. Returns pairs of index and value.
-pub fn continued<const D: usize, const K: usize>(
+/// A profile is that of the fluid right above: fluid t away along the wall counts exp(−t²/Δx²) times as much beside its kernel.
+fn nearness<const D: usize>(offset: &Vector<D>, normal: &Vector<D>, spacing: f64) -> f64 {
+    (-(offset.norm_squared() - offset.dot(normal).powi(2)) / spacing.powi(2)).exp()
+}
+
+/// The profiles below the surface, by solid particle: coefficients of the least-squares fits of `basis`, K functions of the height over
+/// Δx, to `field − base(s)`; None for solid particles that are under no fluid or have no normals.
+pub fn profiles<const D: usize, const K: usize>(
     settings: &Settings,
     particles: &Particles<D>,
     stencil: &Stencil<D>,
     field: &[Vector<D>],
     base: impl Fn(usize) -> Vector<D> + Sync,
     basis: impl Fn(f64) -> [f64; K] + Sync,
-) -> Vec<(usize, Vector<D>)> {
+) -> Vec<(usize, Option<[Vector<D>; K]>)> {
     let wall = Wall { settings, particles, stencil };
     let solids = parallel::filter(particles.real, |i| particles.kind[i] == ParticleKind::Solid);
     let surface = solids.par_iter().filter(|&&s| wall.is_surface(s));
     let fits: Vec<_> = surface.filter_map(|&s| Some((s, wall.fit(s, field, base(s), &basis)?))).collect();
-    solids.par_iter().map(|&s| (s, base(s) + wall.evaluate(s, &fits, &basis))).collect()
+    solids.par_iter().map(|&s| (s, wall.profile_at(s, &fits))).collect()
+}
+
+/// `f(slope, height over the surface)` for each flowing neighbour of solid particle `s`.
+pub fn for_each_height<const D: usize>(
+    settings: &Settings,
+    particles: &Particles<D>,
+    stencil: &Stencil<D>,
+    s: usize,
+    mut f: impl FnMut(f64, f64),
+) {
+    let wall = Wall { settings, particles, stencil };
+    let feet = wall.feet(s);
+    let (row, lane) = stencil.neighbours.row(s);
+    for entry in row.flowing().iter().filter(|entry| entry.slope(lane) != 0.0) {
+        f(entry.slope(lane), wall.foot(entry.j(), &feet).map_or(0.0, |a| wall.height(entry.j(), a, &feet)));
+    }
 }
 
 struct Wall<'a, const D: usize> {
@@ -54,7 +76,8 @@ impl<const D: usize> Wall<'_, D> {
         self.particles.normal[a].dot(&self.particles.normal[b]) > SAME_WALL
     }
 
-    /// Coefficients of the basis at surface particle `s`. None without fluid above.
+    /// Coefficients of the basis at surface particle `s`. None if no fluid is above: its foot is always on another particle, as with
+    /// one in a corner.
     fn fit<const K: usize>(
         &self,
         s: usize,
@@ -62,55 +85,74 @@ impl<const D: usize> Wall<'_, D> {
         base: Vector<D>,
         basis: impl Fn(f64) -> [f64; K],
     ) -> Option<[Vector<D>; K]> {
-        let row = self.stencil.neighbours.row(s).0;
-        let feet = row.solid().iter().map(|entry| entry.j()).filter(|&a| self.is_surface(a) && self.same_wall(a, s));
-        let feet: Vec<usize> = feet.collect();
+        let Self { settings, particles, stencil } = self;
+        let (spacing, normal) = (settings.particle_spacing, &particles.normal[s]);
+        let near = stencil.neighbours.row(s).0.flowing();
+        let (feet, all_feet) = (self.feet(s), self.surface_near(s).collect::<Vec<_>>());
+        let mut is_above = false;
         let mut moments = SMatrix::<f64, K, K>::zeros();
         let mut sums = SMatrix::<f64, K, D>::zeros();
-        for_each_weighted(self.settings, self.stencil, s, row.flowing(), |j, weight, _| {
-            let height = self.height(j, &feet) / self.settings.particle_spacing;
+        for_each_weighted(settings, stencil, s, near, |j, weight, r_sj| {
+            is_above |= self.foot(j, &all_feet) == Some(s);
+            let height = self.foot(j, &feet).map_or(0.0, |a| self.height(j, a, &feet)) / spacing;
             if height > 0.0 {
+                let weight = weight * nearness(&r_sj, normal, spacing);
                 let basis = SMatrix::<f64, K, 1>::from(basis(height));
                 moments += basis * basis.transpose() * weight;
                 sums += basis * (field[j] - base).transpose() * weight;
             }
         });
+        if !is_above {
+            return None;
+        }
         let scale = moments[(0, 0)];
         (1..K).for_each(|k| moments[(k, k)] += RIDGE * scale);
         let coefficients = moments.cholesky()?.solve(&sums);
         Some(std::array::from_fn(|k| coefficients.row(k).transpose()))
     }
 
-    /// Height of particle `j` over the surface, along the normal of the nearest of `feet`; zero without any.
-    fn height(&self, j: usize, feet: &[usize]) -> f64 {
-        let Particles { normal, depth, .. } = self.particles;
-        let from = |a: usize| self.stencil.position[j] - self.stencil.position[a];
-        let nearest = feet.iter().copied().min_by(|&a, &b| from(a).norm_squared().total_cmp(&from(b).norm_squared()));
-        nearest.map_or(0.0, |a| from(a).dot(&normal[a]) - depth[a])
+    /// Surface particles around solid particle `s`, itself among them if it is one.
+    fn surface_near(&self, s: usize) -> impl Iterator<Item = usize> {
+        self.stencil.neighbours.row(s).0.solid().iter().map(|entry| entry.j()).filter(|&a| self.is_surface(a))
     }
 
-    /// The profile of the surface above solid particle `s` at its depth. `fits` are in the order of the particles.
-    fn evaluate<const K: usize>(
-        &self,
-        s: usize,
-        fits: &[(usize, [Vector<D>; K])],
-        basis: impl Fn(f64) -> [f64; K],
-    ) -> Vector<D> {
-        let basis = basis(-self.particles.depth[s] / self.settings.particle_spacing);
-        let at = |fit: &[Vector<D>; K]| (0..K).map(|k| fit[k] * basis[k]).sum::<Vector<D>>();
+    /// Those of the same piece of wall.
+    fn feet(&self, s: usize) -> Vec<usize> {
+        self.surface_near(s).filter(|&a| self.same_wall(a, s)).collect()
+    }
+
+    /// The one of `feet` nearest to particle `j`.
+    fn foot(&self, j: usize, feet: &[usize]) -> Option<usize> {
+        let distance = |a: usize| (self.stencil.position[j] - self.stencil.position[a]).norm_squared();
+        feet.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+    }
+
+    /// Height of particle `j` over the surface: from its foot, along the mean of the normals there and under `j`, which is what the
+    /// height over a circle is.
+    fn height(&self, j: usize, foot: usize, feet: &[usize]) -> f64 {
+        let Particles { normal, depth, .. } = self.particles;
+        let from = |a: usize| self.stencil.position[j] - self.stencil.position[a];
+        let near = |a: usize| (-from(a).norm_squared() / self.settings.particle_spacing.powi(2)).exp();
+        let below = feet.iter().map(|&a| normal[a] * near(a)).sum::<Vector<D>>();
+        from(foot).dot(&(normal[foot] + below.normalize())) / 2.0 - depth[foot]
+    }
+
+    /// The profile of the surface above solid particle `s`: its own, or the average of those around on the same piece of wall. `fits` are
+    /// in the order of the particles.
+    fn profile_at<const K: usize>(&self, s: usize, fits: &[(usize, [Vector<D>; K])]) -> Option<[Vector<D>; K]> {
         let fit_of = |a: usize| fits.binary_search_by_key(&a, |fit| fit.0).ok().map(|found| &fits[found].1);
         if let Some(own) = fit_of(s) {
-            return at(own);
+            return Some(*own);
         }
         let near = self.stencil.neighbours.row(s).0.solid();
         let mut total = 0.0;
-        let mut sum = Vector::zeros();
+        let mut sum = [Vector::zeros(); K];
         for_each_weighted(self.settings, self.stencil, s, near, |a, weight, _| {
             if let Some(fit) = fit_of(a).filter(|_| self.same_wall(a, s)) {
                 total += weight;
-                sum += at(fit) * weight;
+                sum.iter_mut().zip(fit).for_each(|(sum, fit)| *sum += fit * weight);
             }
         });
-        if total > 0.0 { sum / total } else { sum }
+        (total > 0.0).then(|| sum.map(|sum| sum / total))
     }
 }

@@ -1,6 +1,6 @@
 //! Solid walls: what velocity and pressure a solid particle shows to the fluid. (20)
 
-use crate::boundary::profile::continued;
+use crate::boundary::profile::profiles;
 use crate::frame::Frame;
 use crate::kernel::Smoothing;
 use crate::neighbours::Entry;
@@ -20,6 +20,8 @@ pub struct Walls<const D: usize> {
     rule: WallVelocity,
     /// Velocity that solid particles show to the viscous term, real particles and images (not used by the pairwise rule).
     pub viscous_velocity: Vec<Vector<D>>,
+    /// ∂u/∂n at the surface next to each solid particle, if known, real particles; empty unless the rule is `cubic`.
+    pub slope: Vec<Option<Vector<D>>>,
     /// What the viscous term takes off the velocity of each particle to be of fourth order, real particles and images; empty at
     /// second order. See [`Walls::sharpen`].
     pub dispersion: Vec<Vector<D>>,
@@ -27,7 +29,7 @@ pub struct Walls<const D: usize> {
 
 impl<const D: usize> Walls<D> {
     pub fn new(settings: &Settings) -> Self {
-        Self { rule: settings.wall_velocity, viscous_velocity: Vec::new(), dispersion: Vec::new() }
+        Self { rule: settings.wall_velocity, viscous_velocity: Vec::new(), slope: Vec::new(), dispersion: Vec::new() }
     }
 
     /// Renew the velocities that solid particles show to the viscous term.
@@ -36,9 +38,15 @@ impl<const D: usize> Walls<D> {
             WallVelocity::Paper | WallVelocity::Morris => {}
             WallVelocity::Adami => self.mirror(settings, particles, frame),
             WallVelocity::Cubic => {
-                let velocity = &particles.velocity;
+                let (velocity, spacing) = (&particles.velocity, settings.particle_spacing);
                 let basis = |n: f64| [n, n * n / 2.0, n * n * n / 6.0];
-                let seen = continued(settings, particles, &frame.stencil, velocity, |s| velocity[s], basis);
+                let found = profiles(settings, particles, &frame.stencil, velocity, |s| velocity[s], basis);
+                self.slope.resize(particles.real, None);
+                let seen = found.into_iter().map(|(s, profile)| {
+                    self.slope[s] = profile.map(|profile| profile[0] / spacing);
+                    (s, velocity[s] + value_at(profile, basis(-particles.depth[s] / spacing)))
+                });
+                let seen = seen.collect();
                 self.show(particles, frame, seen);
             }
         }
@@ -83,8 +91,11 @@ impl<const D: usize> Walls<D> {
         parallel::for_each(&mut dispersion[..*real], |i, out| {
             *out = if kind[i] == ParticleKind::Fluid { laplacian(i) * factor } else { Vector::zeros() };
         });
-        let solids = continued(settings, particles, &frame.stencil, dispersion, |_| Vector::zeros(), |n| [1.0, n]);
-        solids.into_iter().for_each(|(s, value)| dispersion[s] = value);
+        let basis = |n: f64| [1.0, n];
+        let solids = profiles(settings, particles, &frame.stencil, dispersion, |_| Vector::zeros(), basis);
+        for (s, profile) in solids {
+            dispersion[s] = value_at(profile, basis(-particles.depth[s] / settings.particle_spacing));
+        }
         frame.images.vectors(dispersion);
     }
 
@@ -105,6 +116,11 @@ impl<const D: usize> Walls<D> {
             }
         }
     }
+}
+
+/// Zero without a profile.
+fn value_at<const D: usize, const K: usize>(profile: Option<[Vector<D>; K]>, basis: [f64; K]) -> Vector<D> {
+    profile.map_or_else(Vector::zeros, |profile| (0..K).map(|k| profile[k] * basis[k]).sum())
 }
 
 /// Σ W field_j / Σ W over the flowing neighbours of particle `i`, of the value that `at` gives for j and r_ij. None without
