@@ -3,9 +3,9 @@
 //! The pressure acts through Σ_s Σ_f V_s V_f (p_s + p_f) ∇_s W_sf over solid s and fluid f, the viscous stress through the
 //! compact Laplacian of the same pairs. Both are antisymmetric, so the solid's own pairs cancel and only fluid neighbours count. Their
 //! sum is the momentum that the fluid gives. The viscous pairs feel the slope of the velocity over the width of a kernel. Where
-//! the velocity's slope at the surface is known, the viscous part is its shear, in the same sum, and the pressure part the rest.
+//! the velocity's slope at the surface is known, the viscous part is its shear over the area of the surface, and the pressure part the rest.
 
-use crate::boundary::{Walls, for_each_height};
+use crate::boundary::{Walls, surface_area};
 use crate::frame::Frame;
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
@@ -32,11 +32,12 @@ impl<const D: usize> Default for Load<D> {
 }
 
 impl<const D: usize> Load<D> {
-    fn add(&mut self, arm: &Vector<D>, pressure: Vector<D>, viscous: Vector<D>) {
+    /// Add a pressure force that acts at `arm`, and a viscous force that acts at `surface`.
+    fn add(&mut self, arm: &Vector<D>, pressure: Vector<D>, surface: &Vector<D>, viscous: Vector<D>) {
         self.pressure_force += pressure;
         self.viscous_force += viscous;
         add(&mut self.pressure_torque, cross(arm, &pressure));
-        add(&mut self.viscous_torque, cross(arm, &viscous));
+        add(&mut self.viscous_torque, cross(surface, &viscous));
     }
 
     fn merge(&mut self, other: &Self) {
@@ -61,7 +62,8 @@ pub fn loads<const D: usize>(
             loads.resize(centers.len(), Load::default());
             let (pressure, viscous) = force_on(settings, particles, frame, walls, s);
             let body = particles.body[s] as usize;
-            loads[body].add(&(particles.position[s] - centers[body]), pressure, viscous);
+            let arm = particles.position[s] - centers[body];
+            loads[body].add(&arm, pressure, &(arm + particles.normal[s] * particles.depth[s]), viscous);
         }
         loads
     };
@@ -97,16 +99,12 @@ fn force_on<const D: usize>(
         let relative = (particles.velocity[f] - dispersion(f)) - (walls.seen_by(particles, s, f) - dispersion(s));
         viscous += relative * (-slope * 2.0 * viscosity);
     }
+    (pressure, viscous) = (pressure * stencil.volume[s], viscous * stencil.volume[s]);
     if let Some(&Some(gradient)) = walls.slope.get(s) {
-        let mut area = 0.0;
-        for_each_height(settings, particles, stencil, s, |slope, height| {
-            area -= slope * 2.0 * (height + particles.depth[s]);
-        });
-        let shear = gradient * (viscosity * area);
-        pressure += viscous - shear;
-        viscous = shear;
+        let shear = gradient * (viscosity * surface_area(settings, particles, stencil, s));
+        (pressure, viscous) = (pressure + viscous - shear, shear);
     }
-    (pressure * stencil.volume[s], viscous * stencil.volume[s])
+    (pressure, viscous)
 }
 
 fn add(sum: &mut [f64; 3], part: [f64; 3]) {

@@ -1,6 +1,6 @@
 //! What solid particles show to the viscous term, and its fourth order.
 
-use alsph::boundary::Walls;
+use alsph::boundary::{Walls, surface_area};
 use alsph::loads::{Load, loads};
 use alsph::operators::LaplacianAndGradient;
 use alsph::{ParticleKind, Vector};
@@ -71,6 +71,23 @@ fn solids_show_the_cubic_of_the_fluid_above() {
     assert_relative_eq!(load.viscous_force[0], friction, max_relative = 0.03);
     assert_relative_eq!(load.viscous_force[1], -0.5 * friction, max_relative = 0.03);
     assert!(load.pressure_force.norm() < 0.15 * friction, "{}", load.pressure_force);
+}
+
+/// The solids of a cylinder stand for its surface, whatever the fluid does and however many layers there are.
+#[test]
+fn solids_stand_for_the_area_of_the_surface() {
+    for (side, layers) in [(40, 1), (40, 4), (80, 4)] {
+        let settings = common::settings::<2>(1.0 / side as f64, "none");
+        let mut particles = common::cylinder(side, layers);
+        for i in (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Solid) {
+            particles.normal[i] = (particles.position[i].add_scalar(-0.5)).normalize();
+            particles.depth[i] = -common::distance(&particles.position[i]);
+        }
+        let Set { particles, frame } = Set::of(particles, &settings, true);
+        let solids = (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Solid);
+        let area: f64 = solids.map(|s| surface_area(&settings, &particles, &frame.stencil, s)).sum();
+        assert_relative_eq!(area, 2.0 * PI * common::RADIUS, max_relative = 0.005);
+    }
 }
 
 /// Relative error of the viscous term of a wave `length` Δx long.

@@ -7,5 +7,5 @@ mod solid;
 
 pub use images::Images;
 pub use open::{MassFlow, deep_in_inlet, end_step};
-pub use profile::for_each_height;
+pub use profile::surface_area;
 pub use solid::{Walls, extrapolate};
