@@ -100,8 +100,11 @@ fn force_on<const D: usize>(
         viscous += relative * (-slope * 2.0 * viscosity);
     }
     (pressure, viscous) = (pressure * stencil.volume[s], viscous * stencil.volume[s]);
-    if let Some(&Some(gradient)) = walls.slope.get(s) {
-        let shear = gradient * (viscosity * surface_area(settings, particles, stencil, s));
+    if let Some(&Some(slope)) = walls.slope.get(s) {
+        let normal = &particles.normal[s];
+        // Without divergence the normal velocity has no slope at a wall; that of the fit is no stress.
+        let along = slope - normal * slope.dot(normal);
+        let shear = along * (viscosity * surface_area(settings, particles, stencil, s));
         (pressure, viscous) = (pressure + viscous - shear, shear);
     }
     (pressure, viscous)
