@@ -143,6 +143,15 @@ def test_the_spectral_peak_is_far_finer_than_a_bin(frequency, phase, periods):
     assert abs(peak - frequency) < 0.03 / end
 
 
+def test_a_sine_gives_a_line_of_its_amplitude_and_no_other():
+    time = np.sort(np.random.default_rng(0).uniform(0, 40, 4000))
+    signal = 3 + 0.7 * np.sin(2 * np.pi * 0.25 * time)
+    frequency, amplitude = analysis.amplitude_spectrum(time, signal, 0.0, 40.0)
+    assert frequency[amplitude.argmax()] == pytest.approx(0.25)
+    assert amplitude.max() == pytest.approx(0.7, rel=0.01)
+    assert amplitude[frequency > 0.35].max() < 0.01
+
+
 def test_strouhal_gives_both_methods_and_their_difference():
     time = uneven_times(60.0)
     drag, lift = signals(time, growth=0.0, noise=0.01)

@@ -23,7 +23,7 @@ def test_end_to_end(alsph, tmp_path, small_options):
 
     code, stdout, _ = alsph("plot", run, "--time", 0.1)
     assert code == 0
-    for name in ("forces", "pressure_coefficient", "ledger", "vorticity", "pressure"):
+    for name in ("forces", "spectrum", "pressure_coefficient", "ledger", "vorticity", "pressure"):
         assert str(run / "figures" / f"{name}.png") in stdout
         assert (run / "figures" / f"{name}.png").stat().st_size > 1000
 

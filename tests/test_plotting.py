@@ -74,6 +74,16 @@ def test_forces_show_the_window_and_ignore_the_impulsive_start(run):
     assert window[0].get_x() == pytest.approx(run.window.start)
 
 
+def test_spectra_of_the_forces_in_the_window(run, tmp_path):
+    drag, lift = run.plot_spectrum(tmp_path / "spectrum.png").axes
+    (line,) = lift.lines
+    strongest = line.get_ydata().argmax()
+    assert line.get_xdata()[strongest] == pytest.approx(run.strouhal, abs=1 / (run.window.end - run.window.start))
+    assert line.get_ydata()[strongest] == pytest.approx(run.lift.amplitude, rel=0.2)
+    assert drag.get_ylabel() == "amplitude of $C_D$"
+    assert len(plotting.spectrum({"one": run, "other": run}).axes[1].lines) == 2
+
+
 def test_pressure_coefficient_with_a_reference(run):
     reference = np.linspace(0, 180, 10), np.cos(np.linspace(0, np.pi, 10))
     axes = run.plot_pressure_coefficient(reference=reference).axes[0]
@@ -86,7 +96,7 @@ def test_figures_of_a_run_that_has_just_begun(run, tmp_path):
     for name in ("case.toml", "run.json"):
         (tmp_path / name).write_bytes((run.path / name).read_bytes())
     begun = Run(tmp_path)
-    for figure in (begun.plot_forces(), begun.plot_ledger(), begun.plot_pressure_coefficient()):
+    for figure in (begun.plot_forces(), begun.plot_spectrum(), begun.plot_ledger(), begun.plot_pressure_coefficient()):
         assert isinstance(figure, Figure)
         figure.savefig(tmp_path / "figure.png")
     empty = PressureCoefficient(np.array([0.0, 90.0]), np.full(2, np.nan), np.full(2, np.nan), 0)

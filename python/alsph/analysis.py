@@ -265,20 +265,42 @@ def _slope(x: NDArray[Any], y: FloatArray) -> tuple[float, float]:
     return float(line[0]), float(np.sqrt(covariance[0, 0]))
 
 
+def amplitude_spectrum(
+    time: FloatArray, signal: FloatArray, start: float, end: float, padding: int = 1
+) -> tuple[FloatArray, FloatArray]:
+    """Return the frequencies and the amplitudes of the spectral lines of a signal without its mean, by a Hann window.
+
+    Parameters
+    ----------
+    time, signal : ndarray, shape (n,)
+        Increasing sample times, and the samples; steps may vary.
+    start, end : float
+        The stretch of time looked at.
+    padding : int
+        Bins for each 1/(end - start) of frequency.
+
+    Returns
+    -------
+    frequency, amplitude : ndarray, shape (m,)
+        A sine of amplitude a gives a line of height a.
+    """
+    count = max(64, int(np.count_nonzero((time >= start) & (time <= end))))
+    uniform, step = np.linspace(start, end, count, endpoint=False, retstep=True)
+    samples, taper = np.interp(uniform, time, signal), np.hanning(count)
+    lines = np.abs(np.fft.rfft((samples - samples.mean()) * taper, padding * count))
+    return np.asarray(np.fft.rfftfreq(padding * count, step)), np.asarray(2 * lines / taper.sum())
+
+
 def spectral_peak(time: FloatArray, signal: FloatArray, start: float, end: float, guess: float) -> float:
     """Return the frequency of the strongest spectral line within a factor 1.5 of `guess`.
 
     A Hann window, eightfold zero padding and a parabola through the logarithms of the three highest bins place the peak
     far more finely than the bin width 1/T.
     """
-    count = max(64, int(np.count_nonzero((time >= start) & (time <= end))))
-    uniform, step = np.linspace(start, end, count, endpoint=False, retstep=True)
-    samples = np.interp(uniform, time, signal)
-    power = np.abs(np.fft.rfft((samples - samples.mean()) * np.hanning(count), 8 * count))
-    frequency = np.fft.rfftfreq(8 * count, step)
+    frequency, lines = amplitude_spectrum(time, signal, start, end, padding=8)
     near = np.flatnonzero((frequency > guess / 1.5) & (frequency < guess * 1.5))
-    k = int(near[np.argmax(power[near])])
-    left, middle, right = np.log(np.maximum(power[k - 1 : k + 2], np.finfo(float).tiny))
+    k = int(near[np.argmax(lines[near])])
+    left, middle, right = np.log(np.maximum(lines[k - 1 : k + 2], np.finfo(float).tiny))
     curvature = left - 2 * middle + right
     offset = 0.5 * (left - right) / curvature if curvature < 0 else 0.0
     return float(frequency[k] + offset * frequency[1])

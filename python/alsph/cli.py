@@ -311,7 +311,8 @@ def _plot(
 ) -> None:
     """Draw the figures of a run.
 
-    These are the ledger of the run, its curves beside their reference, forces, pressure coefficient, and fields.
+    These are the ledger of the run, its curves beside their reference, forces and their spectra,
+    pressure coefficient, and fields.
     """
     run = Run(path)
     field = field or ([] if run.case.get("dimensions") == 3 else ["vorticity", "pressure"])
@@ -323,7 +324,7 @@ def _plot(
     }
     drawings["ledger"] = run.plot_ledger
     if run.body:
-        drawings["forces"] = run.plot_forces
+        drawings |= {"forces": run.plot_forces, "spectrum": run.plot_spectrum}
     if run.config.case.surface_points():
         drawings["pressure_coefficient"] = run.plot_pressure_coefficient
     drawings |= {name: functools.partial(run.plot_field, name, time) for name in field}

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.ndimage import binary_fill_holes
 
-from alsph import sampling
+from alsph import analysis, sampling
 from alsph.errors import ConfigError
 from alsph.geometry import FloatArray, Kind
 from alsph.parameters import suggest
@@ -220,6 +220,33 @@ def forces(run: Run, body: str | None = None) -> Figure:
         strouhal = "" if np.isnan(run.strouhal) else f",  Sr = {run.strouhal}"
         lower.set_title(f"rms $C_L$ = {lift.rms}{strouhal}", loc="left", fontsize="medium")
     lower.set_xlabel(TIME_LABEL)
+    return figure
+
+
+def spectrum(runs: dict[str, Run], body: str | None = None) -> Figure:
+    """Amplitudes of the spectral lines of drag and lift in the averaging window.
+
+    Parameters
+    ----------
+    runs : dict
+        Runs by the name they have in the figure.
+    body : str, optional
+        Name of the body; the only one if None.
+    """
+    figure = Figure(figsize=(9, 6), layout="constrained")
+    grid = figure.subplots(2, 1, sharex=True)
+    for axes, axis, symbol in zip(grid, "xy", ("C_D", "C_L"), strict=True):
+        for name, run in runs.items():
+            time, window = run.history["time"], run.window
+            if window.edges.size:
+                coefficient = run.coefficient(axis, body=body)
+                lines = analysis.amplitude_spectrum(time, coefficient, window.start, window.end)
+                axes.loglog(*(a[1:] for a in lines), lw=0.8, label=name)
+        axes.set_ylabel(f"amplitude of ${symbol}$")
+        axes.grid(alpha=0.3)
+        if axes.lines:
+            axes.legend()
+    grid[-1].set_xlabel("$fD/U$")
     return figure
 
 

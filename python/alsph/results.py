@@ -312,6 +312,10 @@ class Run:
         """Figure of drag and lift over time with their parts and the averaging window; saved if `path` is given."""
         return _saved(plotting.forces(self, body), path)
 
+    def plot_spectrum(self, path: str | Path | None = None, body: str | None = None) -> Figure:
+        """Figure of the spectra of drag and lift in the averaging window; saved if `path` is given."""
+        return _saved(plotting.spectrum({self.path.name: self}, body), path)
+
     def plot_field(
         self,
         name: str,
