@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 import shapely
 from alsph import reference, sampling
-from alsph.cases import CASES, BackwardFacingStep, Body, Cavity, Couette, Cylinder, Poiseuille, PressureJump
+from alsph.cases import (
+    CASES,
+    BackwardFacingStep,
+    Body,
+    Cavity,
+    Couette,
+    Cylinder,
+    Poiseuille,
+    PressureJump,
+    TaylorGreen,
+)
 from alsph.cases.backward_facing_step import last_upward_zero
 from alsph.errors import ConfigError
 from alsph.geometry import Kind
@@ -187,6 +197,21 @@ def test_late_velocity_is_exact_for_quadratic_fields(tmp_path):
     points = np.array([[0.5, 0.01], [0.99, 0.5]])
     expected = 2 * np.stack([points.prod(axis=1), points[:, 1] ** 2], axis=1)
     assert sampling.late_velocity(run, points) == pytest.approx(expected, abs=1e-5)
+
+
+def test_a_case_starts_with_the_flow_of_a_coarser_run(tmp_path):
+    def flow(x, _):
+        return np.stack([x[:, 0] * x[:, 1], x[:, 1] ** 2], axis=1)
+
+    run = write_flow(tmp_path / "run", Cavity(resolution=10), flow, times=(1.0,))
+    own = Cavity(resolution=25).build().state
+    state = sampling.initial_state(own, run)
+    fluid = state["kind"] != Kind.SOLID
+    assert state["velocity"][fluid] == pytest.approx(flow(own["position"][fluid], 0), abs=1e-4)
+    assert np.array_equal(state["velocity"][~fluid], own["velocity"][~fluid])
+    assert not own["velocity"][fluid].any()
+    with pytest.raises(ConfigError, match="it is in 2-D and this case in 3-D"):
+        sampling.initial_state(TaylorGreen(resolution=8, dimensions=3).build().state, run)
 
 
 @pytest.mark.parametrize("name", ["cavity_extrema.csv", "step_reattachment.csv", "cylinder_summary.csv"])

@@ -367,3 +367,17 @@ def test_creeping_flow_is_stable_at_the_viscous_limit(small):
     simulation = small.replace(reynolds=1, resolution=10).simulation(2)
     simulation.run_until(0.15)
     assert simulation.history()["velocity_max"].max() < 2.2
+
+
+def test_a_run_goes_on_with_the_flow_of_another_one(small, tmp_path):
+    coarse = small.run(tmp_path / "coarse", until=0.3, progress=False)
+    finer = small.replace(resolution=small.resolution + 4)
+    run = finer.run(tmp_path / "finer", until=0.05, initial_run=str(coarse.path), progress=False)
+    assert run.config.run.initial_run == str(coarse.path)
+    energy, before = run.history["kinetic_energy"], coarse.history["kinetic_energy"]
+    assert run.history["time"][0] < 0.05
+    assert energy[0] == pytest.approx(before[-1], rel=0.02)
+    assert abs(energy[0] - before[0]) > 2 * abs(energy[0] - before[-1])
+    with pytest.raises(RunFolderError, match="nowhere: no such run folder"):
+        finer.run(tmp_path / "other", initial_run="nowhere", progress=False)
+    assert not (tmp_path / "other").exists()

@@ -21,6 +21,10 @@ class RunSettings(Parameters):
 
     until: float | None = Field(default=None, gt=0, description="end time [D/U]; the case's own default if not given")
     threads: int | None = Field(default=None, ge=1, le=4096, description="number of threads; all cores if not given")
+    initial_run: str | None = Field(
+        default=None,
+        description="run folder whose last flow to start with, at any resolution; the case's own start if not given",
+    )
     output_interval: float = Field(default=1.0, gt=0, description="time between two outputs of the particles [D/U]")
     surface_interval: float = Field(
         default=0.1, gt=0, description="time between two samples of the surface pressure [D/U]"

@@ -67,7 +67,7 @@ def start(config: Config, path: Path, control: Control | None = None, *, force: 
     """Run a case from its start in a new run folder: :meth:`alsph.cases.Case.run`."""
     control, folder = control or Control(), RunFolder(path)
     folder.check_new(force=force)
-    simulation = config.case.simulation(config.run.threads)
+    simulation = config.case.simulation(config.run.threads, config.run.initial_run)
     with folder.claimed():
         folder.check_new(force=force)  # another process may have been faster
         folder.create(config, 2 * size_of(simulation.problem.state))

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from alsph.geometry import FloatArray
+from alsph.errors import ConfigError
+from alsph.geometry import FloatArray, Kind
 
 if TYPE_CHECKING:
     from alsph.results import Run
 
 NEIGHBOURS_PER_DIMENSION = 8
 SINGULAR = 1e-5  # directions that the neighbours determine less well than this are left out of a fit
+CHUNK = 50_000  # points that fields are interpolated to at a time
 VOID = 1.5  # points further than this many Δx from every particle have no value
 
 
@@ -95,6 +97,40 @@ def late_velocity(run: Run, points: FloatArray, share: float = 0.25) -> FloatArr
         position, velocity = snapshot.position[snapshot.fluid], snapshot.velocity[snapshot.fluid]
         total += interpolate(position, velocity, points, run.spacing)[0]
     return total / len(late) if len(late) else np.full_like(points, np.nan)
+
+
+def initial_state(state: dict[str, Any], run: Run) -> dict[str, Any]:
+    """Particles with the velocity and pressure of the last snapshot of another run, in fluid and buffers.
+
+    Solids keep what they have, and so do particles further than 1.5 Δx of that run from all its fluid.
+
+    Parameters
+    ----------
+    state : dict
+        Particles of a case at its start, one array a property.
+    run : Run
+        The other run, at any resolution and of any Reynolds number.
+
+    Raises
+    ------
+    ConfigError
+        If the run is of another number of dimensions.
+    RunFolderError
+        If it has no complete snapshot.
+    """
+    snapshot = run.snapshot()
+    dimensions, own = snapshot.position.shape[1], state["position"].shape[1]
+    if dimensions != own:
+        raise ConfigError(f"initial_run = '{run.path}': it is in {dimensions}-D and this case in {own}-D")
+    source = snapshot.position[snapshot.fluid]
+    fields = np.column_stack([snapshot.velocity, snapshot.pressure])[snapshot.fluid]
+    near = KDTree(source).query(state["position"])[0] < VOID * run.spacing
+    chosen = np.flatnonzero(near & (state["kind"] != Kind.SOLID))
+    started = state | {name: state[name].copy() for name in ("velocity", "pressure")}
+    for some in np.array_split(chosen, 1 + len(chosen) // CHUNK):
+        values, _ = interpolate(source, fields, state["position"][some], run.spacing)
+        started["velocity"][some], started["pressure"][some] = values[:, :-1], values[:, -1]
+    return started
 
 
 def control_volume(

@@ -212,17 +212,29 @@ class Case(Parameters):
         """Return this case with the given state, for instance one from a checkpoint."""
         return Problem(self.settings(), state, self.coefficient_body)
 
-    def simulation(self, threads: int | None = None) -> Simulation:
+    def simulation(self, threads: int | None = None, initial_run: str | Path | None = None) -> Simulation:
         """Return a :class:`alsph.Simulation` of this case, at its start.
 
         Parameters
         ----------
         threads
             Number of threads; all cores if None.
+        initial_run
+            Run folder whose last flow this one starts with (:func:`alsph.sampling.initial_state`); the case's own
+            start if None.
+
+        Raises
+        ------
+        ConfigError, RunFolderError
+            If the case does not fit into memory, or the flow of `initial_run` cannot be used.
         """
+        from alsph.results import Run
+        from alsph.sampling import initial_state
         from alsph.simulation import Simulation
 
         problem = self.build()
+        if initial_run is not None:
+            problem = self.problem(initial_state(problem.state, Run(initial_run)))
         if warning := self.time_step_warning():
             warnings.warn(warning, stacklevel=2)
         return Simulation(problem, threads, until=self.default_until)
