@@ -93,6 +93,16 @@ def test_finished_runs_are_used_again_and_changed_ones_are_not(finished):
     assert written[1].read_text() == logs[1]
 
 
+def test_finer_resolutions_may_go_on_with_the_flow_of_coarser_ones(tmp_path):
+    suite = (Entry("taylor_green", (10, 14, 20), until=0.1, continued=0.05),)
+    report = validate(suite=suite, output=tmp_path, threads=1, progress=False)
+    assert [run.config.run.until for run in report.runs] == [0.1, 0.05, 0.05]
+    assert [run.config.run.initial_run for run in report.runs] == [None, *(str(run.path) for run in report.runs[:2])]
+    ends = [run.history["kinetic_energy"][[0, -1]] for run in report.runs]
+    for (_, end), (begin, _) in zip(ends, ends[1:], strict=False):
+        assert begin == pytest.approx(end, rel=0.1)  # the case's own start has 0.25
+
+
 @pytest.mark.parametrize("lost", [[], ["checkpoint.h5"], ["checkpoint.h5", "run.json"]])
 def test_a_validation_that_was_cut_goes_on(finished, tmp_path, monkeypatch, lost):
     record, calls = _Driver._record, []

@@ -1,7 +1,7 @@
 """Validation: cases at several resolutions, judged by their measures, and the report on it."""
 
 import html
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -37,12 +37,16 @@ class Entry:
         End time [D/U].
     parameters : mapping
         Other parameters than the case's defaults.
+    continued : float, optional
+        End time of the finer resolutions [D/U], which then start with the last flow of the next coarser one; if not
+        given, they start as the case does and end like the coarsest.
     """
 
     case: str
     resolutions: tuple[int, ...]
     until: float
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    continued: float | None = None
 
     @property
     def settings(self) -> list[str]:
@@ -54,10 +58,21 @@ class Entry:
         """Begin of the names of its run folders and figures."""
         return "_".join([self.case, *self.settings]).replace(" ", "_")
 
-    def config(self, resolution: int, threads: int | None) -> Config:
-        """Return the case at a resolution, and the settings of its run."""
+    def config(self, resolution: int, threads: int | None, coarser: Path | None = None) -> Config:
+        """Return the case at a resolution and the settings of its run, which goes on with a coarser one if there is."""
         case = cases.find(self.case)(**self.parameters, resolution=resolution)
-        return Config(case, RunSettings(until=self.until, threads=threads, output_interval=self.until / SNAPSHOTS))
+        until = self.continued if self.continued and coarser else self.until
+        initial = str(coarser) if self.continued and coarser else None
+        settings = RunSettings(until=until, threads=threads, output_interval=until / SNAPSHOTS, initial_run=initial)
+        return Config(case, settings)
+
+    def configs(self, path: Path, threads: int | None) -> Iterator[tuple[Path, Config]]:
+        """Yield the run folder in `path` and the configuration at each resolution."""
+        coarser = None
+        for resolution in self.resolutions:
+            folder = path / f"{self.file_name}_resolution_{resolution}"
+            yield folder, self.config(resolution, threads, coarser)
+            coarser = folder
 
 
 # A new case is one line in each.
@@ -226,14 +241,13 @@ def validate(
     entries = _chosen(names, full, suite)
     if resolutions:
         entries = [replace(entry, resolutions=tuple(sorted(set(resolutions)))) for entry in entries]
-    jobs = [(entry, [entry.config(n, threads) for n in entry.resolutions]) for entry in entries]
     report = Report(Path(output), [], [], {})
-    heading = _Heading([config for _, configs in jobs for config in configs], enabled=progress)
-    for entry, configs in jobs:
-        runs = []
-        for config in configs:
+    jobs = [(entry, [*entry.configs(report.path, threads)]) for entry in entries]
+    heading = _Heading([config for _, runs in jobs for _, config in runs], enabled=progress)
+    for entry, planned in jobs:
+        runs: list[Run] = []
+        for folder, config in planned:
             heading.print(config)
-            folder = report.path / f"{entry.file_name}_resolution_{config.case.resolution}"
             try:
                 runs.append(complete(config, folder, Control(progress=progress)))
             except SolverError as error:
