@@ -29,10 +29,8 @@ const SAME_WALL: f64 = 0.7;
 /// curvature next to a wall a fifth too small.
 const RIDGE: f64 = 1e-5;
 
-/// A profile is that of the fluid right above: fluid t away along the wall counts exp(−t²/Δx²) times as much beside its kernel.
-fn nearness<const D: usize>(offset: &Vector<D>, normal: &Vector<D>, spacing: f64) -> f64 {
-    (-(offset.norm_squared() - offset.dot(normal).powi(2)) / spacing.powi(2)).exp()
-}
+/// exp(−x) beyond this is neglected.
+const NEGLIGIBLE: f64 = 10.0;
 
 /// The profiles below the surface, by solid particle: coefficients of the least-squares fits of `basis`, K functions of the height over
 /// Δx, to `field − base(s)`; None for solid particles that are under no fluid or have no normals.
@@ -102,10 +100,17 @@ impl<const D: usize> Wall<'_, D> {
         let mut moments = SMatrix::<f64, K, K>::zeros();
         let mut sums = SMatrix::<f64, K, D>::zeros();
         for_each_weighted(settings, stencil, s, near, |j, weight, r_sj| {
-            is_above |= self.foot(j, &all_feet) == Some(s);
-            let height = self.foot(j, &feet).map_or(0.0, |a| self.height(j, a, &feet)) / spacing;
+            // A profile is that of the fluid right above: fluid t away along the wall counts exp(−t²/Δx²) times as much.
+            let away = (r_sj.norm_squared() - r_sj.dot(normal).powi(2)) / spacing.powi(2);
+            if away > NEGLIGIBLE {
+                return;
+            }
+            let nearest = self.foot(j, &all_feet);
+            is_above |= nearest == Some(s);
+            let foot = nearest.filter(|&a| self.same_wall(a, s)).or_else(|| self.foot(j, &feet));
+            let height = foot.map_or(0.0, |a| self.height(j, a, &feet)) / spacing;
             if height > 0.0 {
-                let weight = weight * nearness(&r_sj, normal, spacing);
+                let weight = weight * (-away).exp();
                 let basis = SMatrix::<f64, K, 1>::from(basis(height));
                 moments += basis * basis.transpose() * weight;
                 sums += basis * (field[j] - base).transpose() * weight;
@@ -141,8 +146,11 @@ impl<const D: usize> Wall<'_, D> {
     fn height(&self, j: usize, foot: usize, feet: &[usize]) -> f64 {
         let Particles { normal, depth, .. } = self.particles;
         let from = |a: usize| self.stencil.position[j] - self.stencil.position[a];
-        let near = |a: usize| (-from(a).norm_squared() / self.settings.particle_spacing.powi(2)).exp();
-        let below = feet.iter().map(|&a| normal[a] * near(a)).sum::<Vector<D>>();
+        let square = from(foot).norm_squared();
+        // How much further than the foot, in the exponent of a Gaussian of the width Δx.
+        let further = |a: usize| (from(a).norm_squared() - square) / self.settings.particle_spacing.powi(2);
+        let near = feet.iter().map(|&a| (a, further(a))).filter(|&(_, further)| further < NEGLIGIBLE);
+        let below = near.map(|(a, further)| normal[a] * (-further).exp()).sum::<Vector<D>>();
         from(foot).dot(&(normal[foot] + below.normalize())) / 2.0 - depth[foot]
     }
 
