@@ -89,13 +89,13 @@ FULL = (
     Entry("poiseuille", (20, 40, 80), until=2.5),
     Entry("couette", (20, 40, 80), until=2.5),
     Entry("pressure_jump", (20, 40), until=2.0),
-    Entry("cavity", (25, 50, 100), until=24.0, parameters={"reynolds": 100}),
-    Entry("cavity", (50, 100), until=36.0, parameters={"reynolds": 400}),
-    Entry("cavity", (50, 100, 150), until=60.0, parameters={"reynolds": 1000}),
-    Entry("backward_facing_step", (10, 20), until=60.0, parameters={"reynolds": 100}),
-    Entry("backward_facing_step", (10, 20), until=150.0, parameters={"reynolds": 389}),
-    Entry("cylinder", (10, 20, 30), until=60.0, parameters={"reynolds": 100}),
-    Entry("cylinder", (10, 20, 30), until=60.0, parameters={"reynolds": 200}),
+    Entry("cavity", (25, 50, 100), until=24.0, parameters={"reynolds": 100}, continued=12.0),
+    Entry("cavity", (50, 100), until=36.0, parameters={"reynolds": 400}, continued=18.0),
+    Entry("cavity", (50, 100, 150), until=60.0, parameters={"reynolds": 1000}, continued=24.0),
+    Entry("backward_facing_step", (10, 20), until=60.0, parameters={"reynolds": 100}, continued=30.0),
+    Entry("backward_facing_step", (10, 20), until=150.0, parameters={"reynolds": 389}, continued=75.0),
+    Entry("cylinder", (10, 20, 30), until=60.0, parameters={"reynolds": 100}, continued=30.0),
+    Entry("cylinder", (10, 20, 30), until=45.0, parameters={"reynolds": 200}, continued=30.0),
 )
 
 
