@@ -29,7 +29,7 @@ test-python: $(EXTENSION)
 	$(BIN)/mypy
 	$(BIN)/pytest
 
-validate: $(EXTENSION)  ## Cases beside their reference solutions, in about a minute on two cores.
+validate: $(EXTENSION)  ## Cases beside their reference solutions, in minutes on two cores.
 	$(BIN)/alsph validate
 
 bench:

@@ -153,7 +153,7 @@ class _DaskPool:
             from distributed import Client
         except ImportError:
             raise ConfigError(
-                "scheduler: Dask is not installed; install alsph with its extra: pip install 'alsph[cluster]'"
+                "scheduler: Dask is not installed; install alsph with its extra: pip install '.[cluster]'"
             ) from None
         try:
             self._client = Client(scheduler, timeout="10s", set_as_default=False)
