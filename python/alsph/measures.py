@@ -2,7 +2,9 @@
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from alsph.geometry import FloatArray
 
@@ -44,7 +46,7 @@ class Measure:
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """A computed curve and the reference curve to draw beside it.
+    """A computed curve and the reference curve to draw beside it, if there is one.
 
     Attributes
     ----------
@@ -53,7 +55,7 @@ class Profile:
     axes : (str, str)
         Labels of abscissa and ordinate, with units.
     computed, reference : (x, y)
-        Arrays (m,) and (n,) of each.
+        Arrays (m,) and (n,) of each; n = 0 where the reference is not known.
     source : str
         Where the reference comes from.
     """
@@ -61,8 +63,8 @@ class Profile:
     name: str
     axes: tuple[str, str]
     computed: tuple[FloatArray, FloatArray]
-    reference: tuple[FloatArray, FloatArray]
-    source: str
+    reference: tuple[FloatArray, FloatArray] = field(default_factory=lambda: (np.empty(0), np.empty(0)))
+    source: str = ""
 
     @property
     def file_name(self) -> str:

@@ -357,7 +357,7 @@ def _energy_budget(axes: Axes, ledger: Ledger) -> None:
 
 
 def profile(curves: dict[str, Profile]) -> Figure:
-    """Draw computed curves over the reference curve.
+    """Draw computed curves, and the reference curve where it is known.
 
     Parameters
     ----------
@@ -368,7 +368,8 @@ def profile(curves: dict[str, Profile]) -> Figure:
     axes = figure.subplots()
     for name, curve in curves.items():
         axes.plot(*curve.computed, lw=1.2, label=name)
-    axes.plot(*curve.reference, "k:", lw=1.5, label=f"reference: {curve.source}")
+    if curve.reference[0].size:
+        axes.plot(*curve.reference, "k:", lw=1.5, label=f"reference: {curve.source}")
     axes.set(xlabel=curve.axes[0], ylabel=curve.axes[1])
     axes.set_title(curve.name, fontsize="medium")
     axes.grid(alpha=0.3)
