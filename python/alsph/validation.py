@@ -93,7 +93,7 @@ FULL = (
     Entry("cavity", (50, 100), until=36.0, parameters={"reynolds": 400}, continued=18.0),
     Entry("cavity", (50, 100, 150), until=60.0, parameters={"reynolds": 1000}, continued=24.0),
     Entry("backward_facing_step", (10, 20), until=60.0, parameters={"reynolds": 100}, continued=30.0),
-    Entry("backward_facing_step", (10, 20), until=150.0, parameters={"reynolds": 389}, continued=75.0),
+    Entry("backward_facing_step", (10, 20), until=220.0, parameters={"reynolds": 389}, continued=75.0),
     Entry("cylinder", (10, 20, 30), until=60.0, parameters={"reynolds": 100}, continued=30.0),
     Entry("cylinder", (10, 20, 30), until=45.0, parameters={"reynolds": 200}, continued=30.0),
 )

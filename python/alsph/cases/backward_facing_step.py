@@ -48,7 +48,7 @@ class BackwardFacingStep(Case):
     @property
     def default_until(self) -> float:
         """Time by which the flow is steady; it grows with the Reynolds number."""
-        return 40.0 + 0.25 * self.reynolds
+        return 20.0 + 0.5 * self.reynolds
 
     @property
     def inlet_height(self) -> float:
