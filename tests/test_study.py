@@ -265,7 +265,9 @@ def whole(tmp_path_factory):
 def test_a_study_that_is_stopped_or_killed_goes_on_and_ends_with_the_same_bits(tmp_path, whole, number):
     file, output = tmp_path / "long.toml", tmp_path / "out"
     file.write_text(LONG_TOML)
+    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)  # as in the background of a script
     process = alsph_study(file, "-o", output)
+    signal.signal(signal.SIGINT, previous)
     declared = study.load(file)
     wait_for(lambda: any(s.time > 0.1 for s in study.states(declared.points(), output).values()))
     process.send_signal(number)

@@ -5,6 +5,7 @@ The options of ``run`` and ``describe`` are the fields of the case and of :class
 
 import functools
 import inspect
+import signal
 import types
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -454,4 +455,6 @@ def _print_table(rows: list[tuple[str, str]]) -> None:
 def main() -> None:
     """Run the command line."""
     warnings.formatwarning = lambda message, *_args, **_kwargs: f"warning: {message}\n"
+    # Shells have the background jobs of a script ignore SIGINT: it shall stop a study there, too, as it does a run.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     app()
