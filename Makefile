@@ -7,7 +7,7 @@ EXTENSION := python/alsph/_alsph.abi3.so
 SOURCES := Cargo.toml Cargo.lock pyproject.toml $(shell find rust -name '*.rs')
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: build run test test-rust test-python validate bench clean
+.PHONY: build run test test-rust test-python test-validation validate bench clean
 
 build: $(EXTENSION)
 
@@ -15,7 +15,7 @@ run: $(EXTENSION)  ## The cylinder at a coarse resolution, in about three minute
 	$(BIN)/alsph run cylinder --resolution 10 --until 20 --output runs/cylinder --force
 	$(BIN)/alsph plot runs/cylinder
 
-test: test-rust test-python
+test: test-rust test-python test-validation
 
 test-rust: $(TOOLS)
 	cargo fmt --check
@@ -28,6 +28,9 @@ test-python: $(EXTENSION)
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/pytest
+
+test-validation: $(EXTENSION)  ## The quick validation from scratch.
+	$(BIN)/alsph validate --quick --output "$$(mktemp -d)"
 
 validate: $(EXTENSION)  ## Cases beside their reference solutions, in minutes on two cores.
 	$(BIN)/alsph validate
