@@ -30,7 +30,8 @@ test-python: $(EXTENSION)
 	$(BIN)/pytest
 
 test-validation: $(EXTENSION)  ## The quick validation from scratch.
-	$(BIN)/alsph validate --quick --output "$$(mktemp -d)"
+	rm -rf target/validation
+	$(BIN)/alsph validate --quick --output target/validation
 
 validate: $(EXTENSION)  ## Cases beside their reference solutions, in minutes on two cores.
 	$(BIN)/alsph validate
