@@ -2,9 +2,7 @@
 
 import math
 import re
-from dataclasses import dataclass, field
-
-import numpy as np
+from dataclasses import dataclass
 
 from alsph.geometry import FloatArray
 
@@ -63,8 +61,8 @@ class Profile:
     name: str
     axes: tuple[str, str]
     computed: tuple[FloatArray, FloatArray]
-    reference: tuple[FloatArray, FloatArray] = field(default_factory=lambda: (np.empty(0), np.empty(0)))
-    source: str = ""
+    reference: tuple[FloatArray, FloatArray]
+    source: str
 
     @property
     def file_name(self) -> str:

@@ -61,8 +61,7 @@ class Entry:
     def config(self, resolution: int, threads: int | None, coarser: Path | None = None) -> Config:
         """Return the case at a resolution and the settings of its run, which goes on with a coarser one if there is."""
         case = cases.find(self.case)(**self.parameters, resolution=resolution)
-        until = self.continued if self.continued and coarser else self.until
-        initial = str(coarser) if self.continued and coarser else None
+        until, initial = (self.continued, str(coarser)) if self.continued and coarser else (self.until, None)
         settings = RunSettings(until=until, threads=threads, output_interval=until / SNAPSHOTS, initial_run=initial)
         return Config(case, settings)
 
