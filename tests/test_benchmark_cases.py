@@ -247,6 +247,17 @@ def test_fluid_flows_around_the_body(shape, angle):
     assert (points - [2, 0]) / np.hypot(*(points - [2, 0]).T)[:, None] == pytest.approx(directions, abs=1e-8)
 
 
+def test_a_run_past_a_body_tells_its_forces(tmp_path):
+    case = Body(resolution=8, length=5.0, height=4.0, upstream=2.0, angle_of_attack=20.0)
+    run = case.run(tmp_path / "run", until=0.6, progress=False)
+    measures = {measure.name: measure for measure in run.measures}
+    assert measures["mean drag coefficient"].value == run.drag.mean > 0.5
+    assert measures["mean lift coefficient"].value == run.lift.mean
+    assert {"rms lift coefficient", "Strouhal number"} < set(measures)
+    assert all(math.isnan(measure.reference) for measure in measures.values())
+    assert run.summary()["mean lift coefficient"] == run.lift.mean
+
+
 def test_square_body_is_symmetric_and_on_the_lattice():
     state = Body(length=5.0, height=4.0, upstream=2.0).particles()
     distance, _ = KDTree(state["position"]).query(state["position"] * [1, -1])

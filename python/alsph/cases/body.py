@@ -1,8 +1,10 @@
 """Flow past a body of any shape in the cylinder's channel."""
 
+from __future__ import annotations
+
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 import shapely
@@ -12,6 +14,10 @@ from shapely import affinity
 
 from alsph.cases.channel import Channel
 from alsph.geometry import FloatArray, Solid, body_layers, inside
+from alsph.measures import Measure
+
+if TYPE_CHECKING:
+    from alsph.results import Run
 
 
 class Body(Channel):
@@ -62,6 +68,10 @@ class Body(Channel):
     def outside(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return which points lie outside the outline."""
         return ~inside(self.outline, points)
+
+    def measures(self, run: Run) -> list[Measure]:
+        """Return the forces, the mean lift among them, which a body at an angle has, and the Strouhal number."""
+        return [*super().measures(run), Measure("mean lift coefficient", run.lift.mean)]
 
     def surface_points(self) -> tuple[FloatArray, FloatArray]:
         """Return 144 points evenly along the surface; their angles are seen from the centroid."""

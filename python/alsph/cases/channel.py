@@ -1,7 +1,10 @@
-"""What the cases of a body in a channel share: inlet, outlet, free-slip walls and the flow at the start."""
+"""What the cases of a body in a channel share: inlet, outlet, free-slip walls, the flow at the start, the forces."""
 
+from __future__ import annotations
+
+import math
 from abc import abstractmethod
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +12,11 @@ from pydantic import Field, field_validator, model_validator
 
 from alsph.cases.base import Case
 from alsph.geometry import FloatArray, Kind, Solid, cell_centres, join, lattice, particles, symmetric_centres
+from alsph.measures import Measure
+from alsph.reference import Reference
+
+if TYPE_CHECKING:
+    from alsph.results import Run
 
 
 class Channel(Case):
@@ -102,6 +110,26 @@ class Channel(Case):
             particles(Kind.OUTLET, lattice(self.length + buffer, rows), [1.0, 0.0]),
             self.solid().moved(self.centre).particles(),
         )
+
+    def measures(self, run: Run) -> list[Measure]:
+        """Return the forces on the body and the Strouhal number."""
+        known = self._reference() or Reference({}, "")
+        computed = {
+            "mean drag coefficient": (run.drag.mean, 0.02),
+            "mean drag coefficient, pressure part": (run.drag.pressure, 0.03),
+            "mean drag coefficient, viscous part": (run.drag.viscous, 0.03),
+            "rms lift coefficient": (run.lift.rms, 0.05),
+            "lift coefficient amplitude": (run.lift.amplitude, 0.05),
+            "Strouhal number": (run.strouhal, 0.01),
+        }
+        return [
+            Measure(name, value, known.results.get(name, math.nan), tolerance, known.source)
+            for name, (value, tolerance) in computed.items()
+        ]
+
+    def _reference(self) -> Reference | None:
+        """Return the independent solution of this flow, None where there is none."""
+        return None
 
     def _initial_velocity(self, position: FloatArray) -> FloatArray:
         """Uniform flow and a Gaussian vortex (divergence-free) about the body, fastest 0.6 D from its centre."""

@@ -57,19 +57,7 @@ class Cylinder(Channel):
 
     def measures(self, run: Run) -> list[Measure]:
         """Return forces and Strouhal number, and the error of the pressure coefficient where its curve is known."""
-        known = self._reference() or Reference({}, "")
-        computed = {
-            "mean drag coefficient": (run.drag.mean, 0.02),
-            "mean drag coefficient, pressure part": (run.drag.pressure, 0.03),
-            "mean drag coefficient, viscous part": (run.drag.viscous, 0.03),
-            "rms lift coefficient": (run.lift.rms, 0.05),
-            "lift coefficient amplitude": (run.lift.amplitude, 0.05),
-            "Strouhal number": (run.strouhal, 0.01),
-        }
-        measures = [
-            Measure(name, value, known.results.get(name, math.nan), tolerance, known.source)
-            for name, (value, tolerance) in computed.items()
-        ]
+        measures = super().measures(run)
         for profile in self.profiles(run):
             (angle, mean), expected = profile.computed, np.interp(profile.computed[0], *profile.reference)
             error = np.abs(mean - expected)[angle > 10].max()
