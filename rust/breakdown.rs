@@ -78,7 +78,10 @@ fn largest_volume(settings: &Settings) -> f64 {
 /// at a distance from one is no less deep than it by more than that.
 fn depth<const D: usize>(particles: &Particles<D>, frame: &Frame<D>, i: usize) -> f64 {
     let least = |j: usize| particles.depth[j] - (particles.position[j] - particles.position[i]).norm();
-    frame.stencil.neighbours.row(i).0.solid().iter().fold(0.0, |deepest: f64, entry| deepest.max(least(entry.j())))
+    let (row, lane) = frame.stencil.neighbours.row(i);
+    // Of two at one place, the one whose face it is not on is deeper.
+    let facing = row.solid_seen(lane).filter(|(_, share)| *share > 0.5);
+    facing.fold(0.0, |deepest: f64, (entry, _)| deepest.max(least(entry.j())))
 }
 
 /// How far `position` lies beyond the sides of the domain that particles cannot cross.

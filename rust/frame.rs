@@ -1,6 +1,7 @@
 //! A frame: the particle positions at which derivatives are taken, with their images, neighbours and stencil.
 
 use crate::boundary::Images;
+use crate::faces::Faces;
 use crate::neighbours::Grid;
 use crate::parallel::{self, CHUNK};
 use crate::particles::{Particles, Vector};
@@ -34,6 +35,7 @@ pub struct Frame<const D: usize> {
     pub images: Images<D>,
     pub grid: Grid<D>,
     pub stencil: Stencil<D>,
+    pub faces: Faces<D>,
     /// Where the particles are expected while the list is in use: r^n + u^n Δt. Empty if the list is for r^n only.
     expected: Vec<Vector<D>>,
     /// r^n of the real particles, if the frame is not there.
@@ -61,6 +63,7 @@ impl<const D: usize> Frame<D> {
         }
         // Images that come within reach during the step, too.
         self.images.create(particles, &settings.domain, search_radius(settings) + 3.0 * distance);
+        self.faces.find(particles);
         self.start.clear();
         if travel.fraction > 0.0 {
             self.start.extend_from_slice(&particles.position[..particles.real]);
@@ -108,6 +111,10 @@ impl<const D: usize> Frame<D> {
 
     fn evaluate(&mut self, settings: &Settings, particles: &Particles<D>) {
         let images = &self.images;
+        let faces = &self.faces;
+        self.stencil.neighbours.share_out(faces.is_empty(), |cluster, entries, out| {
+            faces.share_out(particles, cluster, entries, out);
+        });
         self.stencil.evaluate(settings, particles, |volume| images.scalars(volume));
     }
 }

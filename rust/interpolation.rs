@@ -1,32 +1,35 @@
 //! Values of the fluid at any point: linear moving least squares.
 
+use crate::frame::Frame;
 use crate::kernel::Smoothing;
-use crate::neighbours::Grid;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::Settings;
 use crate::with_kernel;
 use nalgebra::{DMatrix, DVector};
 
-/// Pressure and velocity at `point` from the fluid around it, exact for linear fields; None where no fluid is near.
+/// Pressure and velocity at `point` from the fluid around it that is seen from there, exact for linear fields; None where no fluid is
+/// near.
 pub fn interpolate<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
-    grid: &Grid<D>,
+    Frame { grid, faces, .. }: &Frame<D>,
     point: &Vector<D>,
 ) -> Option<(f64, Vector<D>)> {
     if !point.iter().all(|x| x.is_finite()) {
         return None;
     }
     let radius = settings.support_radius();
-    let mut near = Vec::new();
+    let (mut near, mut solid) = (Vec::new(), Vec::new());
     grid.for_each_run(&[*point], |run| {
-        near.extend(run.indices.iter().map(|&j| j as usize).filter(|&j| {
-            particles.kind[j] != ParticleKind::Solid && (particles.position[j] - point).norm_squared() < radius * radius
-        }));
+        let inside = run.indices.iter().map(|&j| j as usize);
+        for j in inside.filter(|&j| (particles.position[j] - point).norm_squared() < radius * radius) {
+            if particles.kind[j] == ParticleKind::Solid { solid.push(j) } else { near.push(j) }
+        }
     });
     let weights = with_kernel!(settings.kernel, K => {
         let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
-        shape_functions(&near, radius, particles, point, |distance| kernel.value(distance))
+        let seen = |place: &Vector<D>| faces.sight(particles, settings.particle_spacing, &solid, point, place);
+        shape_functions(&near, radius, particles, point, |place: &Vector<D>, distance| seen(place) * kernel.value(distance))
     })?;
     let pressure = near.iter().zip(&weights).map(|(&j, w)| particles.pressure[j] * w).sum();
     let velocity = near.iter().zip(&weights).map(|(&j, w)| particles.velocity[j] * *w).sum();
@@ -39,13 +42,13 @@ fn shape_functions<const D: usize>(
     radius: f64,
     particles: &Particles<D>,
     point: &Vector<D>,
-    kernel: impl Fn(f64) -> f64,
+    weight: impl Fn(&Vector<D>, f64) -> f64,
 ) -> Option<Vec<f64>> {
     let basis = |j: usize| {
         let r = (particles.position[j] - point) / radius;
         DVector::from_fn(D + 1, |k, _| if k == 0 { 1.0 } else { r[k - 1] })
     };
-    let weight = |j: usize| kernel((particles.position[j] - point).norm());
+    let weight = |j: usize| weight(&particles.position[j], (particles.position[j] - point).norm());
     let mut moments = DMatrix::zeros(D + 1, D + 1);
     for &j in near {
         let p = basis(j);

@@ -7,6 +7,7 @@
 pub mod boundary;
 pub mod breakdown;
 pub mod error;
+pub mod faces;
 pub mod frame;
 mod interpolation;
 pub mod kernel;

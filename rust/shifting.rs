@@ -129,7 +129,7 @@ impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
         let limit = V::splat(self.settings.neighbour_distance().powi(2));
         let (mut asymmetry, mut relative) = ([V::zero(); D], [V::zero(); D]);
         let (mut total, mut distances, mut count) = (V::zero(), V::zero(), V::zero());
-        for two in row.all().chunks(2) {
+        for (pair, two) in row.all().chunks(2).enumerate() {
             // An odd last entry stands twice, the second time unused.
             let two_j = [two[0].j(), two[two.len() - 1].j()];
             let r = [from(here, &position[two_j[0]]), from(here, &position[two_j[1]])];
@@ -137,7 +137,10 @@ impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
             for k in 0..two.len() {
                 let (j, r_ij, (q, inverse, value)) = (two_j[k], r[k], ratios[k]);
                 // The row also holds particles beyond the support of this lane, which must not count.
-                let inside = norm_squared(from(here_in_frame, &in_frame[j])).below(limit);
+                let mut inside = norm_squared(from(here_in_frame, &in_frame[j])).below(limit);
+                if let Some(shares) = row.shares.get(2 * pair + k) {
+                    inside = inside * V::load_single(shares);
+                }
                 add_product(&mut asymmetry, inside * inverse * (inverse * inverse), r_ij);
                 distances = distances.plus_product(inside, q);
                 count += inside;

@@ -266,8 +266,7 @@ impl<const D: usize> Simulation<D> {
             simulation.prepare();
             let mut values = vec![(f64::NAN, Vector::repeat(f64::NAN)); points.len()];
             parallel::for_each(&mut values, |k, value| {
-                if let Some(sample) =
-                    interpolate(&simulation.settings, &simulation.particles, &simulation.frame.grid, &points[k])
+                if let Some(sample) = interpolate(&simulation.settings, &simulation.particles, &simulation.frame, &points[k])
                 {
                     *value = sample;
                 }

@@ -259,8 +259,27 @@ impl<K: Kernel, const D: usize> VisitMut<f64, (), ()> for Volumes<'_, K, D> {
                 }
             }
         }
-        let sum = (sum * V::splat(value_factor)).store();
+        let mut sum = (sum * V::splat(value_factor)).store();
+        if !row.shares.is_empty() {
+            sum = self.sum_of_shares(cluster, row);
+        }
         volume.iter_mut().zip(sum).for_each(|(volume, sum)| *volume = 1.0 / sum);
+    }
+}
+
+impl<K: Kernel, const D: usize> Volumes<'_, K, D> {
+    /// Take off the slopes what the cluster's particles do not see, and return Σ W. That counts each place once, and all fluid: the
+    /// volume of a particle is that of its place, whatever it sees.
+    fn sum_of_shares(&self, cluster: Cluster, row: RowMut<'_>) -> [f64; LANES] {
+        let mut sum = [0.0; LANES];
+        for (k, (entry, shares)) in row.entries.iter_mut().zip(row.shares).enumerate() {
+            for (lane, i) in cluster.particles().into_iter().enumerate() {
+                let share = if k < row.flowing { 1.0 } else { f64::from(shares[lane]) };
+                sum[lane] += share * self.kernel.value((self.position[i] - self.position[entry.j()]).norm());
+                entry.slopes[lane] *= shares[lane];
+            }
+        }
+        sum
     }
 }
 

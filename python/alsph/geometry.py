@@ -162,19 +162,25 @@ def walls(region: Polygon, spacing: float, layers: int) -> Solid:
     return _facing(points[(distance > 0) & (distance < layers * spacing)], region, spacing)
 
 
+ROOM = 0.75
+"""A solid particle is put where the nearest one is farther than this [Δx]."""
+
+
 def body_layers(shape: Polygon, spacing: float, layers: int) -> Solid:
     """Place solid particles on layers that follow the surface of a body, at depths of 1/2, 3/2, ... spacings.
 
-    Parts too thin for a layer, such as a sharp trailing edge, get a single file of particles along their middle.
+    What these leave empty between them, such as the middle of a plate 2.5 Δx thick, is filled as far as there is room.
     """
     rings = [_along(ring, spacing) for depth in cell_centres(layers, spacing) for ring in _offset(shape, depth)]
     position = np.concatenate([np.empty((0, 2)), *rings])
-    for depth in spacing * np.linspace(0.5, 0.05, 19):
-        candidates = np.concatenate([np.empty((0, 2)), *(_along(ring, spacing / 8) for ring in _offset(shape, depth))])
-        while len(candidates):
-            room = KDTree(position).query(candidates)[0] if len(position) else np.full(len(candidates), np.inf)
-            if room.max() < spacing:
-                break
+    core = shape.buffer(-0.5 * spacing)
+    candidates = cells(core, spacing / 8) if not core.is_empty else np.empty((0, 2))
+    candidates = candidates[inside(core, candidates)]
+    candidates = candidates[shapely.distance(shape.boundary, shapely.points(candidates)) < (layers - 0.5) * spacing]
+    while len(candidates):
+        room = KDTree(position).query(candidates)[0]
+        candidates, room = candidates[room > ROOM * spacing], room[room > ROOM * spacing]
+        if len(candidates):
             position = np.concatenate([position, candidates[[room.argmax()]]])
     return _facing(position, shape, spacing)
 

@@ -94,7 +94,8 @@ impl<const D: usize> Wall<'_, D> {
     ) -> Option<[Vector<D>; K]> {
         let Self { settings, particles, stencil } = self;
         let (spacing, normal) = (settings.particle_spacing, &particles.normal[s]);
-        let near = stencil.neighbours.row(s).0.flowing();
+        let (row, lane) = stencil.neighbours.row(s);
+        let near = row.flowing_seen(lane);
         let (feet, all_feet) = (self.feet(s), self.surface_near(s).collect::<Vec<_>>());
         let mut is_above = false;
         let mut moments = SMatrix::<f64, K, K>::zeros();
@@ -161,7 +162,8 @@ impl<const D: usize> Wall<'_, D> {
         if let Some(own) = fit_of(s) {
             return Some(*own);
         }
-        let near = self.stencil.neighbours.row(s).0.solid();
+        let (row, lane) = self.stencil.neighbours.row(s);
+        let near = row.solid_seen(lane);
         let mut total = 0.0;
         let mut sum = [Vector::zeros(); K];
         for_each_weighted(self.settings, self.stencil, s, near, |a, weight, _| {

@@ -133,7 +133,8 @@ fn shepard<const D: usize, const N: usize>(
 ) -> Option<[f64; N]> {
     let mut total = 0.0;
     let mut sum = [0.0; N];
-    for_each_weighted(settings, stencil, i, stencil.neighbours.row(i).0.flowing(), |j, weight, r_ij| {
+    let (row, lane) = stencil.neighbours.row(i);
+    for_each_weighted(settings, stencil, i, row.flowing_seen(lane), |j, weight, r_ij| {
         let value = at(j, r_ij);
         total += weight;
         for k in 0..N {
@@ -159,20 +160,20 @@ pub fn extrapolate<const D: usize>(
     extrapolated.into_iter().for_each(|(i, value)| field[i] = value);
 }
 
-/// `f(j, W_ij, r_ij)` for those of the neighbours `near` of particle `i` that are in its support. Others of its cluster's may be
+/// `f(j, W_ij, r_ij)`, with what is seen of j as a factor of W, for those of the neighbours `near` of particle `i` that are in its support. Others of its cluster's may be
 /// there too, and what they carry may be stale.
 pub fn for_each_weighted<const D: usize>(
     settings: &Settings,
     stencil: &Stencil<D>,
     i: usize,
-    near: &[Entry],
+    near: impl Iterator<Item = (Entry, f64)>,
     mut f: impl FnMut(usize, f64, Vector<D>),
 ) {
     with_kernel!(settings.kernel, K => {
         let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
-        for entry in near {
+        for (entry, share) in near {
             let r_ij = stencil.position[i] - stencil.position[entry.j()];
-            let weight = kernel.value(r_ij.norm());
+            let weight = share * kernel.value(r_ij.norm());
             if weight != 0.0 {
                 f(entry.j(), weight, r_ij);
             }

@@ -49,6 +49,8 @@ impl Entry {
 pub struct Row<'a> {
     entries: &'a [Entry],
     flowing: usize,
+    /// How much of each neighbour each particle of the cluster sees; empty if all of them see all.
+    pub shares: &'a [[f32; LANES]],
 }
 
 impl<'a> Row<'a> {
@@ -67,6 +69,22 @@ impl<'a> Row<'a> {
     pub fn solid(&self) -> &'a [Entry] {
         &self.entries[self.flowing..]
     }
+
+    /// The flowing neighbours that the particle of a lane sees any of, and how much.
+    pub fn flowing_seen(&self, lane: usize) -> impl Iterator<Item = (Entry, f64)> + use<'a> {
+        self.seen(0..self.flowing, lane)
+    }
+
+    /// The solid neighbours that the particle of a lane sees any of, and how much.
+    pub fn solid_seen(&self, lane: usize) -> impl Iterator<Item = (Entry, f64)> + use<'a> {
+        self.seen(self.flowing..self.entries.len(), lane)
+    }
+
+    fn seen(&self, range: Range<usize>, lane: usize) -> impl Iterator<Item = (Entry, f64)> + use<'a> {
+        let Self { entries, shares, .. } = *self;
+        let share = move |k| shares.get(k).map_or(1.0, |shares: &[f32; LANES]| f64::from(shares[lane]));
+        range.map(move |k| (entries[k], share(k))).filter(|(_, share)| *share > 0.0)
+    }
 }
 
 /// A row to be changed.
@@ -75,6 +93,8 @@ pub struct RowMut<'a> {
     pub entries: &'a mut [Entry],
     /// Number of flowing neighbours, which come first.
     pub flowing: usize,
+    /// As in [`Row`].
+    pub shares: &'a [[f32; LANES]],
 }
 
 /// Up to four particles that follow each other in the arrays.
@@ -124,8 +144,13 @@ struct Chunk {
     entries: Vec<Entry>,
     /// Start of each row and of its solid part, and the end.
     starts: Vec<[u32; 2]>,
+    /// Number of its particles.
+    count: usize,
     /// Neighbours of the row in the making.
     near: Vec<u32>,
+    /// The shares of the rows that have some, and where those of each row start and end; empty if every particle sees all.
+    shares: Vec<[f32; LANES]>,
+    shared: Vec<[u32; 2]>,
 }
 
 impl Chunk {
@@ -137,14 +162,21 @@ impl Chunk {
     #[inline(always)]
     fn row(&self, row: usize) -> Row<'_> {
         let [start, solid] = self.starts[row];
-        Row { entries: &self.entries[self.range(row)], flowing: (solid - start) as usize }
+        let shares = shares_of(&self.shares, &self.shared, row);
+        Row { entries: &self.entries[self.range(row)], flowing: (solid - start) as usize, shares }
     }
 
     #[inline(always)]
     fn row_mut(&mut self, row: usize) -> RowMut<'_> {
         let ([start, solid], range) = (self.starts[row], self.range(row));
-        RowMut { entries: &mut self.entries[range], flowing: (solid - start) as usize }
+        let shares = shares_of(&self.shares, &self.shared, row);
+        RowMut { entries: &mut self.entries[range], flowing: (solid - start) as usize, shares }
     }
+}
+
+#[inline(always)]
+fn shares_of<'a>(shares: &'a [[f32; LANES]], shared: &[[u32; 2]], row: usize) -> &'a [[f32; LANES]] {
+    shared.get(row).map_or(&[], |&[start, end]| &shares[start as usize..end as usize])
 }
 
 #[derive(Debug, Default)]
@@ -167,6 +199,22 @@ impl NeighbourList {
         self.chunks.par_iter_mut().enumerate().with_max_len(TASK).for_each(|(c, chunk)| {
             let start = c * CHUNK;
             run(Search { chunk, start, count: CHUNK.min(real - start), particles, expected, grid, radius });
+        });
+    }
+
+    /// Let `shares` add to a vector what each particle of a cluster sees of each neighbour, or nothing if that is all of it; with
+    /// `all` every particle sees all.
+    pub fn share_out(&mut self, all: bool, shares: impl Fn(Cluster, &[Entry], &mut Vec<[f32; LANES]>) + Sync) {
+        self.chunks.par_iter_mut().enumerate().with_max_len(TASK).for_each(|(c, chunk)| {
+            chunk.shares.clear();
+            chunk.shared.clear();
+            for row in 0..if all { 0 } else { chunk.starts.len() - 1 } {
+                let cluster =
+                    Cluster { first: c * CHUNK + row * LANES, count: chunk.count.min((row + 1) * LANES) - row * LANES };
+                let (start, range) = (chunk.shares.len() as u32, chunk.range(row));
+                shares(cluster, &chunk.entries[range], &mut chunk.shares);
+                chunk.shared.push([start, chunk.shares.len() as u32]);
+            }
         });
     }
 
@@ -250,7 +298,8 @@ struct Search<'a, const D: usize> {
 impl<const D: usize> Task for Search<'_, D> {
     #[inline(always)]
     fn run<V: Lanes>(self) {
-        let Chunk { entries, starts, near } = self.chunk;
+        self.chunk.count = self.count;
+        let Chunk { entries, starts, near, .. } = self.chunk;
         let blank = |&index: &u32| Entry { slopes: [0.0; LANES], index };
         let solid = |j: &u32| self.particles.kind[*j as usize] == ParticleKind::Solid;
         entries.clear();

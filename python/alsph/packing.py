@@ -1,0 +1,130 @@
+"""The fluid around a body at the start: as much as there is room for, none on the surface, evenly spaced."""
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+from shapely import MultiPolygon, Polygon
+
+from alsph.geometry import FloatArray, inside
+
+BAND = 4.0
+"""Particles as far from the body as this [Δx] are moved."""
+
+CLEARANCE = 0.4
+"""Least distance from the surface [Δx]."""
+
+WIDTH = 0.6
+"""Width of the Gaussian by which particles repel each other [Δx]."""
+
+SWEEPS = 200
+STEP = 0.1
+EVEN = 1e-6
+"""Displacement [Δx] below which particles count as evenly spaced: on a lattice that fits the body they stay."""
+
+
+def pack(
+    lattice: FloatArray, body: Polygon | MultiPolygon, solid: FloatArray, spacing: float, *, symmetric: bool
+) -> FloatArray:
+    """Return fluid particles (m, 2) around a body, their number times Δx² being the area that it leaves.
+
+    Those next to the body are taken from where they are most crowded until the number is right, and then repel each
+    other until they are evenly spaced.
+
+    Parameters
+    ----------
+    lattice
+        Cell centres (n, 2) of the fluid and the body.
+    body
+        The body.
+    solid
+        Its solid particles (k, 2).
+    spacing
+        Particle spacing Δx.
+    symmetric
+        Whether the flow is to be its own mirror image about y = 0; the number may then be one off.
+    """
+    count = round(len(lattice) - body.area / spacing**2)
+    height = _height(body, lattice)
+    far, near = lattice[height > BAND * spacing], lattice[(height <= BAND * spacing) & (height > -spacing)]
+    fixed = np.concatenate([_around(far, body, 3 * BAND * spacing), solid])
+    near = _thinned(near, fixed, count - len(far), spacing, symmetric)
+    return np.concatenate([far, _spread(near, fixed, body, spacing, symmetric)])
+
+
+def _height(body: Polygon | MultiPolygon, points: FloatArray) -> FloatArray:
+    """Return how far points (n, 2) lie outside the body, negative inside it."""
+    distance = shapely.distance(body.boundary, shapely.points(points))
+    return np.where(inside(body, points), -distance, distance)
+
+
+def _around(points: FloatArray, body: Polygon | MultiPolygon, reach: float) -> FloatArray:
+    return points[_height(body, points) < reach]
+
+
+def _mirror(points: FloatArray) -> NDArray[np.intp]:
+    """Return the index of the mirror image about y = 0 of each point (n, 2)."""
+    return np.asarray(KDTree(points).query(points * (1.0, -1.0))[1])
+
+
+def _thinned(near: FloatArray, fixed: FloatArray, count: int, spacing: float, symmetric: bool) -> FloatArray:
+    """Take away the most crowded particles, with their mirror images, until `count` are left."""
+    tree = KDTree(near)
+    partner = _mirror(near) if symmetric else np.arange(len(near))
+    crowd = _weights(near, np.concatenate([near, fixed]), spacing)
+    kept = np.ones(len(near), bool)
+    while (surplus := int(kept.sum()) - count) > 0:
+        # Of equals the one farthest back in the list, so that rounding does not choose.
+        most = int(np.flatnonzero(kept & (crowd > crowd[kept].max() - 1e-9))[-1])
+        both = {most, int(partner[most])}
+        if len(both) > surplus:
+            break
+        for gone in both:
+            kept[gone] = False
+            around = np.array(tree.query_ball_point(near[gone], 4 * WIDTH * spacing))
+            crowd[around] -= _gaussian(near[around] - near[gone], spacing)
+    return near[kept]
+
+
+def _gaussian(offset: FloatArray, spacing: float) -> FloatArray:
+    return np.asarray(np.exp(-0.5 * (offset**2).sum(axis=-1) / (WIDTH * spacing) ** 2))
+
+
+def _weights(points: FloatArray, others: FloatArray, spacing: float) -> FloatArray:
+    """Return the sum of the Gaussians of `others` at each of the points."""
+    near = KDTree(others).query_ball_point(points, 4 * WIDTH * spacing)
+    return np.array([_gaussian(others[j] - point, spacing).sum() for point, j in zip(points, near, strict=True)])
+
+
+def _spread(
+    near: FloatArray, fixed: FloatArray, body: Polygon | MultiPolygon, spacing: float, symmetric: bool
+) -> FloatArray:
+    """Let the particles repel each other, and the solid and far ones them."""
+    partner = _mirror(near) if symmetric else np.arange(len(near))
+    flip = np.array([1.0, -1.0 if symmetric else 1.0])
+    reach = 4 * WIDTH * spacing
+    for _ in range(SWEEPS):
+        everyone = np.concatenate([near, fixed])
+        pairs = KDTree(near).sparse_distance_matrix(KDTree(everyone), reach, output_type="coo_matrix")
+        offset = near[pairs.row] - everyone[pairs.col]
+        push = offset * _gaussian(offset, spacing)[:, None]
+        force = np.stack([np.bincount(pairs.row, push[:, axis], len(near)) for axis in range(2)], axis=1)
+        move = STEP * force / WIDTH
+        size = np.hypot(*move.T)[:, None]
+        if size.max() < EVEN * spacing:
+            break
+        near = near + move * np.minimum(1, 0.1 * spacing / np.maximum(size, 1e-300))
+        near = _cleared(near, body, CLEARANCE * spacing)
+        near = 0.5 * (near + near[partner] * flip) if symmetric else near
+    return near
+
+
+def _cleared(points: FloatArray, body: Polygon | MultiPolygon, least: float) -> FloatArray:
+    """Move points that are nearer than `least` to the body out to that distance."""
+    height = _height(body, points)
+    low = np.flatnonzero(height < least)
+    feet = shapely.get_coordinates(shapely.shortest_line(shapely.points(points[low]), body.boundary))[1::2]
+    outward = (points[low] - feet) / height[low][:, None]
+    points = points.copy()
+    points[low] = feet + least * outward
+    return points
