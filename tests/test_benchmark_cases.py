@@ -286,9 +286,12 @@ def test_body_from_a_file(tmp_path):
 @pytest.mark.parametrize(
     ("content", "problem"),
     [
-        ("0 0\n1 1\n1 0\n0 1\n", "Self-intersection"),
-        ("0 0\n1 1\n", "three or more"),
-        ("x\n0 a\n", "'a'"),
+        (
+            "0 0\n1 1\n1 0\n0 1\n",
+            r'curve.csv:1: "0 0": the curve meets itself after this line and after line 3, at \(0.5',
+        ),
+        ("0 0\n1 1\n", 'curve.csv:1: "0 0": .*three or more'),
+        ("x\n0 a\n", 'curve.csv:2: "0 a": two numbers expected'),
         (None, "neither"),
     ],
 )

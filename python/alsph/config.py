@@ -63,16 +63,24 @@ class Config:
 
     def case_tables(self) -> dict[str, Any]:
         """Return the same without the settings of the run."""
-        values = {name: getattr(self.case, name) for name in self.case.parameter_names()}
+        values = self.case.model_dump(include=set(self.case.parameter_names()))
+        values = {name: values[name] for name in self.case.parameter_names()}
         return {"case": self.case.name} | {name: value for name, value in values.items() if value is not None}
 
     def save(self, path: Path) -> None:
         """Write the configuration with all its parameters to a TOML file."""
-        path.write_text(tomli_w.dumps(self.tables()), encoding="utf-8")
+        path.write_text(tomli_w.dumps(self.tables(), multiline_strings=True), encoding="utf-8")
 
 
-def from_tables(tables: dict[str, Any]) -> Config:
+def from_tables(tables: dict[str, Any], folder: Path = Path()) -> Config:
     """Return the configuration with these tables: ``case``, the parameters of the case, and a table ``run``.
+
+    Parameters
+    ----------
+    tables
+        The tables.
+    folder
+        Folder that the path of an outline in them starts from.
 
     Raises
     ------
@@ -85,6 +93,9 @@ def from_tables(tables: dict[str, Any]) -> Config:
         raise ConfigError('case: missing, or not a string; add for instance case = "cylinder"')
     if not isinstance(run, dict):
         raise ConfigError(f"run = {run!r}: must be a table, [run]")
+    shape = parameters.get("shape")
+    if isinstance(shape, str) and shape not in cases.body.SHAPES:
+        parameters["shape"] = str(folder / shape)
     case = cases.find(name)(**parameters)
     try:
         return Config(case, RunSettings(**run))
@@ -92,15 +103,22 @@ def from_tables(tables: dict[str, Any]) -> Config:
         raise ConfigError(f"run.{error}") from None
 
 
-def load(path: str | Path) -> Config:
+def load(path: str | Path, folder: Path | None = None) -> Config:
     """Read a configuration file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    folder
+        Folder that the path of an outline in it starts from; its own if None.
 
     Raises
     ------
     ConfigError
         If it cannot be read or used; the message starts with the file's name.
     """
-    return read(path, from_tables)
+    return read(path, lambda tables: from_tables(tables, Path(path).parent if folder is None else folder))
 
 
 def read(path: str | Path, make: Callable[[dict[str, Any]], Made]) -> Made:

@@ -1,6 +1,7 @@
 """Particle arrangements, and the problem that is handed to the engine."""
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -33,13 +34,13 @@ class Problem:
         The engine's settings (see docs/architecture.md).
     state
         The particles, one array a property, and optionally ``time``, ``step``, ``mass_in``, ``mass_out``, ``next_id``.
-    coefficient_body
-        Name of the body whose force coefficients are reported, if any.
+    coefficient_bodies
+        Names of the bodies whose force coefficients are reported, all together.
     """
 
     settings: dict[str, Any]
     state: dict[str, Any]
-    coefficient_body: str | None = None
+    coefficient_bodies: Sequence[str] = ()
 
     @property
     def dimensions(self) -> int:

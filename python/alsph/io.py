@@ -142,9 +142,14 @@ class RunFolder:
         """Return the resolved configuration."""
         self._require("case.toml")
         try:
-            return config.load(self._file("case.toml"))
+            return config.load(self._file("case.toml"), Path())
         except ConfigError as error:
-            raise RunFolderError(f"{error}; the folder is damaged or was made by another version") from None
+            remedy = (
+                "it is of an older alsph and does not hold the outline: put the file there, or go to where it was run"
+                if "shape = '" in str(error)
+                else "the folder is damaged or was made by another version"
+            )
+            raise RunFolderError(f"{error}; {remedy}") from None
 
     def info(self) -> dict[str, Any]:
         """Return the content of ``run.json``."""

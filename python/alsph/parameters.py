@@ -75,7 +75,9 @@ def _one_line(model: type[Parameters], error: ValidationError) -> str:
     if first["type"] == "extra_forbidden":
         text = f"{name}: unknown parameter; {suggest(name, model.model_fields)}"
     elif name:
-        text = f"{name} = {first['input']!r}: {message} ({model.describe(name)})"
+        value = repr(first["input"])
+        value = value if len(value) < 200 else f"{value[:200]}..."
+        text = f"{name} = {value}: {message} ({model.describe(name)})"
     else:
         text = message
     return f"{text} (and {len(others)} more)" if others else text

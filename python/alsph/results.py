@@ -145,8 +145,8 @@ class Run:
 
     @property
     def body(self) -> str | None:
-        """Name of the body in the flow that drag and lift are those of; None between walls."""
-        return self.config.case.coefficient_body
+        """Name of the body in the flow that drag and lift are those of, or names of several; None between walls."""
+        return ", ".join(self.config.case.coefficient_bodies) or None
 
     def coefficient(self, axis: str, part: str = "total", body: str | None = None) -> FloatArray:
         """Force coefficient in every step, F / (½ρU²D).
@@ -157,16 +157,16 @@ class Run:
             Direction of the force; drag is ``x`` and lift ``y``.
         part : {"total", "pressure", "viscous"}
         body : str, optional
-            Name of the body; the first one if None.
+            Name of the body; if None those of :attr:`body` together, or the first one between walls.
 
         Returns
         -------
         ndarray, shape (steps,)
             NaN if there is no such body.
         """
-        name = body or next(iter(self.bodies), "")
+        names = [body] if body else self.config.case.coefficient_bodies or self.bodies[:1] or [""]
         parts = ("pressure", "viscous") if part == "total" else (part,)
-        columns = [self.history.get(f"{name}_{each}_force_{axis}") for each in parts]
+        columns = [self.history.get(f"{name}_{each}_force_{axis}") for each in parts for name in names]
         missing = np.full(len(self.history["time"]), np.nan)
         return 2.0 * sum((missing if column is None else column for column in columns), np.zeros_like(missing))
 
@@ -180,12 +180,12 @@ class Run:
 
     @cached_property
     def drag(self) -> Load:
-        """Drag coefficient of the first body."""
+        """Drag coefficient of the body, of all bodies together if there are several."""
         return self.load("x")
 
     @cached_property
     def lift(self) -> Load:
-        """Lift coefficient of the first body."""
+        """Lift coefficient of the body, of all bodies together if there are several."""
         return self.load("y")
 
     def load(self, axis: str, body: str | None = None) -> Load:
@@ -201,7 +201,7 @@ class Run:
 
     @cached_property
     def strouhal(self) -> Estimate:
-        """Strouhal number fD/U of the lift on the first body."""
+        """Strouhal number fD/U of the lift."""
         return self._measure(analysis.strouhal, self.coefficient("y"))
 
     @cached_property

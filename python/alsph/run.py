@@ -190,12 +190,14 @@ def _changes(now: Config, saved: Checkpoint, folder: RunFolder) -> list[str]:
     except ConfigError as error:
         raise RunFolderError(f"{folder.path}: the case of its checkpoint cannot be used: {error}") from None
     old, new = (case.problem(saved.state).settings for case in (before, now.case))
-    if fixed := [name for name in FIXED if old[name] != new[name]]:
+    fixed = [name for name in FIXED if old[name] != new[name]]
+    made_for = [name for name in now.case.made_for if getattr(before, name) != getattr(now.case, name)]
+    if fixed := made_for + fixed:
         raise RunFolderError(
             f"{folder.path}/case.toml has been changed in what the particles were made for ({', '.join(fixed)}); "
             "undo the change, or start a new run"
         )
-    names = [name for name in then | tables if then.get(name) != tables.get(name)]
+    names = [name for name in then | tables if then.get(name) != tables.get(name) and name not in now.case.made_for]
     return [f"{name} = {tables.get(name)} (was {then.get(name)})" for name in names]
 
 

@@ -40,7 +40,8 @@ class Case(Parameters):
     title: ClassVar[str]
     velocity_max: ClassVar[float] = 1.0
     """Expected largest velocity in U, for estimates of the time step."""
-    coefficient_body: ClassVar[str | None] = None
+    made_for: ClassVar[tuple[str, ...]] = ()
+    """Parameters that the particles are made for beside what the engine's settings tell: no run changes them."""
 
     reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, ge=8, description="particles per reference length, D/Δx [-]")
@@ -138,6 +139,11 @@ class Case(Parameters):
         """Return the solid bodies."""
         return []
 
+    @property
+    def coefficient_bodies(self) -> list[str]:
+        """Names of the bodies that drag and lift are those of, all together."""
+        return []
+
     def surface_points(self) -> tuple[FloatArray, FloatArray] | None:
         """Return ``angle`` (m,) [degrees from the front] and ``position`` (m, d) of the C_p samples."""
         return None
@@ -210,7 +216,7 @@ class Case(Parameters):
 
     def problem(self, state: dict[str, Any]) -> Problem:
         """Return this case with the given state, for instance one from a checkpoint."""
-        return Problem(self.settings(), state, self.coefficient_body)
+        return Problem(self.settings(), state, self.coefficient_bodies)
 
     def simulation(self, threads: int | None = None, initial_run: str | Path | None = None) -> Simulation:
         """Return a :class:`alsph.Simulation` of this case, at its start.

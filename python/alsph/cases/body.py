@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import shapely
@@ -15,6 +16,7 @@ from shapely import affinity
 from alsph.cases.channel import Channel
 from alsph.geometry import FloatArray, Solid, body_layers, inside
 from alsph.measures import Measure
+from alsph.outline import Outline
 
 if TYPE_CHECKING:
     from alsph.results import Run
@@ -23,26 +25,36 @@ if TYPE_CHECKING:
 class Body(Channel):
     """Flow past a body of any shape in a channel with free-slip walls and uniform inflow U.
 
-    D is the side of the square, the chord of the airfoil, or the unit of the file's lengths. The body's centroid lies
-    at (upstream, 0). The solid particles follow the surface; parts thinner than about 2Δx are badly resolved.
+    D is the side of the square, the chord of the airfoil, or the unit of the file's lengths (see
+    :mod:`alsph.outline`). The centroid, of all bodies together if the file has several, lies at (upstream, 0). The
+    solid particles follow the surface; parts thinner than about 2Δx are badly resolved.
     """
 
     name: ClassVar[str] = "body"
     title: ClassVar[str] = "flow past a body of any shape in a channel"
     body_name: ClassVar[str] = "body"
-    coefficient_body: ClassVar[str | None] = "body"
+    made_for: ClassVar[tuple[str, ...]] = ("shape", "angle_of_attack")
 
-    shape: str = Field(
+    shape: str | Outline = Field(
         default="square_cylinder",
-        description="square_cylinder, naca0012, or a text file of the closed curve's points, a pair of lengths a line",
+        description="square_cylinder, naca0012, or a text file of points: one or several closed curves, lengths in D",
     )
     angle_of_attack: float = Field(default=0.0, ge=-180, le=180, description="angle of attack, nose up [degrees]")
 
-    @field_validator("shape")
+    @field_validator("shape", mode="before")
     @classmethod
-    def _known(cls, shape: str) -> str:
-        _outline(shape)
-        return shape
+    def _read(cls, shape: Any) -> str | Outline:
+        if isinstance(shape, str) and shape in SHAPES:
+            return shape
+        if isinstance(shape, dict):
+            return Outline(**shape)
+        if isinstance(shape, str | os.PathLike):
+            if not os.path.exists(shape):
+                raise ValueError(f"neither {' nor '.join(SHAPES)} nor a file that is there")
+            return Outline.read(shape)
+        if isinstance(shape, Outline):
+            return shape
+        raise ValueError("must be a name, a file, or an outline as run folders hold it")
 
     @model_validator(mode="after")
     def _fits_in(self) -> Self:
@@ -51,19 +63,34 @@ class Body(Channel):
             self.upstream + left, self.length - self.upstream - right, bottom + self.height / 2, self.height / 2 - top
         )
         if room < 0.5:
-            raise ValueError(f"the body comes within {room:.3g} D of a side of the channel; leave at least 0.5 D")
+            raise ValueError(
+                f"the body, {right - left:.3g} D long and {top - bottom:.3g} D high, comes within {room:.3g} D of a "
+                "side of the channel; leave at least 0.5 D"
+            )
         return self
 
     @cached_property
-    def outline(self) -> shapely.Polygon:
-        """The body, its centroid at the origin, turned by the angle of attack."""
-        outline = _outline(self.shape)
+    def outline(self) -> shapely.Polygon | shapely.MultiPolygon:
+        """The body, or all bodies together, their centroid at the origin, turned by the angle of attack."""
+        polygons = [SHAPES[self.shape]()] if isinstance(self.shape, str) else self.shape.polygons
+        outline = polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
         centred = affinity.translate(outline, -outline.centroid.x, -outline.centroid.y)
         return affinity.rotate(centred, -self.angle_of_attack, origin=(0, 0))
 
-    def solid(self) -> Solid:
-        """Return layers along the surface."""
-        return body_layers(self.outline, self.particle_spacing, self.support_layers)
+    @property
+    def outlines(self) -> list[shapely.Polygon]:
+        """The single bodies of :attr:`outline`."""
+        return list(shapely.get_parts(self.outline))
+
+    @property
+    def coefficient_bodies(self) -> list[str]:
+        """``body``, or ``body_1``, ``body_2``, ... where there are several."""
+        count = len(self.outlines)
+        return ["body"] if count == 1 else [f"body_{number}" for number in range(1, count + 1)]
+
+    def solids(self) -> list[Solid]:
+        """Return layers along the surface of each body."""
+        return [body_layers(outline, self.particle_spacing, self.support_layers) for outline in self.outlines]
 
     def outside(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return which points lie outside the outline."""
@@ -74,49 +101,25 @@ class Body(Channel):
         return [*super().measures(run), Measure("mean lift coefficient", run.lift.mean)]
 
     def surface_points(self) -> tuple[FloatArray, FloatArray]:
-        """Return 144 points evenly along the surface; their angles are seen from the centroid."""
+        """Return 144 points evenly along the surfaces; their angles are seen from the centroid."""
         share = np.arange(144) / 144
-        points = shapely.get_coordinates(shapely.line_interpolate_point(self.outline.exterior, share, normalized=True))
+        points = shapely.get_coordinates(shapely.line_interpolate_point(self.outline.boundary, share, normalized=True))
         angle = np.degrees(np.arctan2(points[:, 1], -points[:, 0])).round(9) % 360.0
         order = np.argsort(angle, kind="stable")
         return angle[order], self.centre + points[order]
 
 
-def _outline(shape: str) -> shapely.Polygon:
-    """Return the shape with that name or in that file, in D.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or its curve crosses itself.
-    """
-    if shape == "square_cylinder":
-        return shapely.box(-0.5, -0.5, 0.5, 0.5)
-    points = _naca0012() if shape == "naca0012" else _read(shape)
-    outline = shapely.Polygon(points)
-    if not outline.is_valid or outline.area == 0:
-        raise ValueError(f"no simple closed curve: {shapely.is_valid_reason(outline)}")
-    return outline
+def _square_cylinder() -> shapely.Polygon:
+    return shapely.box(-0.5, -0.5, 0.5, 0.5)
 
 
-def _naca0012(count: int = 100) -> FloatArray:
-    """Return points (2 count, 2) of the NACA 0012 airfoil of chord 1 with a closed trailing edge."""
+def _naca0012(count: int = 100) -> shapely.Polygon:
+    """Return the NACA 0012 airfoil of chord 1 with a closed trailing edge and 2 count points."""
     x = 0.5 * (1 - np.cos(np.linspace(0, np.pi, count + 1)))
     powers = np.stack([np.sqrt(x), x, x**2, x**3, x**4])
     y = 0.6 * np.array([0.2969, -0.1260, -0.3516, 0.2843, -0.1036]) @ powers
-    return np.concatenate([np.stack([x, y], axis=1), np.stack([x, -y], axis=1)[-2:0:-1]])
+    return shapely.Polygon(np.concatenate([np.stack([x, y], axis=1), np.stack([x, -y], axis=1)[-2:0:-1]]))
 
 
-def _read(path: str) -> FloatArray:
-    """Return the two columns (n, 2) of a text file, separated by commas or blanks; its first line may be a title."""
-    try:
-        lines = Path(path).read_text(encoding="utf-8").replace(",", " ").splitlines()
-    except (OSError, UnicodeDecodeError):
-        raise ValueError("neither square_cylinder nor naca0012 nor a readable file") from None
-    try:
-        points = np.loadtxt(lines, ndmin=2)
-    except ValueError:
-        points = np.loadtxt(lines[1:], ndmin=2)
-    if points.shape[1:] != (2,) or len(points) < 3:
-        raise ValueError("the file must hold three or more lines of two numbers")
-    return points
+SHAPES: dict[str, Callable[[], shapely.Polygon]] = {"square_cylinder": _square_cylinder, "naca0012": _naca0012}
+"""The shapes that have a name."""

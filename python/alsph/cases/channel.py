@@ -63,13 +63,18 @@ class Channel(Case):
         self.whole_cells("height", self.height)
         return self
 
+    @property
+    def coefficient_bodies(self) -> list[str]:
+        """Names of the bodies that drag and lift are those of, all together."""
+        return [self.body_name]
+
     @abstractmethod
-    def solid(self) -> Solid:
-        """Return the solid particles of the body, relative to its centre."""
+    def solids(self) -> list[Solid]:
+        """Return the solid particles of each body, relative to the centre."""
 
     @abstractmethod
     def outside(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Return which points (n, 2), relative to the centre of the body, lie outside it."""
+        """Return which points (n, 2), relative to the centre, lie outside the bodies."""
 
     @property
     def default_until(self) -> float:
@@ -90,8 +95,9 @@ class Channel(Case):
         }
 
     def bodies(self) -> list[dict[str, Any]]:
-        """Return the body, at rest."""
-        return [{"name": self.body_name, "velocity": [0.0, 0.0], "moves": False, "center": [self.upstream, 0.0]}]
+        """Return the bodies, at rest; their torques are about the centre."""
+        at_rest = {"velocity": [0.0, 0.0], "moves": False, "center": [self.upstream, 0.0]}
+        return [{"name": name} | at_rest for name in self.coefficient_bodies]
 
     def particle_estimate(self) -> int:
         """Return about how many particles there are, solid and buffers included."""
@@ -108,7 +114,7 @@ class Channel(Case):
             particles(Kind.FLUID, fluid, self._initial_velocity(fluid)),
             particles(Kind.INLET, lattice(-buffer, rows), [1.0, 0.0]),
             particles(Kind.OUTLET, lattice(self.length + buffer, rows), [1.0, 0.0]),
-            self.solid().moved(self.centre).particles(),
+            *(solid.moved(self.centre).particles(body=index) for index, solid in enumerate(self.solids())),
         )
 
     def measures(self, run: Run) -> list[Measure]:

@@ -35,11 +35,10 @@ class Cylinder(Channel):
     name: ClassVar[str] = "cylinder"
     title: ClassVar[str] = "flow past a circular cylinder in a channel"
     body_name: ClassVar[str] = "cylinder"
-    coefficient_body: ClassVar[str | None] = "cylinder"
 
-    def solid(self) -> Solid:
+    def solids(self) -> list[Solid]:
         """Return concentric rings."""
-        return cylinder_rings(RADIUS, self.particle_spacing, self.support_layers)
+        return [cylinder_rings(RADIUS, self.particle_spacing, self.support_layers)]
 
     def outside(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return which points are at least a radius from the centre."""

@@ -149,6 +149,7 @@ class Study(Parameters):
     collect: list[str] = Field(default=[], description="results to tabulate; all if none are given")
     figures: list[Figure] = Field(default=[], description="figures to draw")
     published: list[Published] = Field(default=[], description="results of others")
+    folder: str = Field(default="", description="folder that paths of outlines start from; that of the study's file")
 
     @model_validator(mode="after")
     def _drawable(self) -> Self:
@@ -199,7 +200,7 @@ class Study(Parameters):
                 raise ConfigError(f"study {self.name}: sweep.{name}: must be a parameter of the case, or run.SETTING")
             (tables["run"] if where else tables)[key] = value
         try:
-            return config.from_tables(tables)
+            return config.from_tables(tables, Path(self.folder))
         except ConfigError as error:
             raise ConfigError(f"study {self.name}, {dict(parameters)}: {error}") from None
 
@@ -238,7 +239,7 @@ def load(study: str | Path, preset: str | None = None) -> Study:
         raise ConfigError(
             f"{study}: neither a file nor a study that comes with alsph; {suggest(str(study), shipped())}"
         )
-    return config.read(path, lambda tables: _parsed(tables, preset))
+    return config.read(path, lambda tables: _parsed({"folder": str(path.parent)} | tables, preset))
 
 
 def _parsed(tables: dict[str, Any], preset: str | None) -> Study:
