@@ -49,6 +49,7 @@ def targets(folder):
     import numpy as np
     from alsph import checkpoint, config, open_run, reading, resume, study
     from alsph.errors import AlsphError
+    from alsph.outline import Outline
 
     state = checkpoint.read(folder / "checkpoint.h5").state
     until = state["time"] + 1e-9
@@ -90,7 +91,9 @@ def targets(folder):
     (folder / "study.toml").write_bytes(
         Path(study.__file__).with_name("shipped").joinpath("reynolds.toml").read_bytes()
     )
+    (folder / "outline.txt").write_text("two\n3. 3.\n\n0,0\n.5,.1\n1,0\n\n0,0\n.5,-.1\n1,0\n999 999\n2,0\n3,0\n2,1\n")
     return {
+        "outline": ("outline.txt", Outline.read),
         "configuration": ("case.toml", config.load),
         "study": ("study.toml", lambda path: study.load(path).points()),
         "checkpoint": ("checkpoint.h5", checkpoint.read),

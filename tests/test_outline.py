@@ -208,10 +208,28 @@ def test_no_folder_device_pipe_or_giant_is_read(tmp_path):
             Body(shape=path)
     with pytest.raises(ConfigError, match="must be a name, a file, or an outline"):
         Body(shape=5)
-    (tmp_path / "long").write_text("0 0\n" + 2**20 * "1" + "!! 1\n")
+    (tmp_path / "long").write_text("0 0\n" + 2**19 * "1" + "!! 1\n")
     with pytest.raises(ConfigError, match="long:2: a line of"):
         Body(shape=tmp_path / "long")
     assert clock.monotonic() - start < 2
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (rows(np.random.default_rng(1).random((2000, 2))), "the curve meets itself"),
+        ("".join(f"{k % 2} {k % 3}\n" for k in range(19_000)), "the curve meets itself"),
+        ("".join(f"{k % 2} {k % 3}\n" for k in range(200_000)), "has 200,001 lines"),
+        ("".join(f"0 0\n{k} 0\n{k} 5\n0 0\n\n" for k in range(1, 3000)), "overlap"),
+        ("".join(f"{k} 0\n" for k in range(25_000)), "holds 25,000 points"),
+    ],
+    ids=["random", "zigzag", "long", "bodies", "many"],
+)
+def test_what_takes_long_to_sort_out_is_refused_soon(content, problem, tmp_path):
+    start = clock.monotonic()
+    with pytest.raises(ConfigError, match=problem):
+        read(tmp_path, content)
+    assert clock.monotonic() - start < 10
 
 
 STARS = st.lists(st.floats(0.2, 1.0), min_size=3, max_size=30)

@@ -19,13 +19,16 @@ from typing import Self
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters
 
-LARGEST_FILE = 4 * 2**20
+LARGEST_FILE = 2**20
 """Size of the largest file that is read [bytes]; outlines have some kilobytes."""
+MOST_POINTS, MOST_REPAIRED = 20_000, 2000
+"""Most points of a file, and of a curve that meets itself somewhere."""
 LARGEST_NUMBER = 1e6
 """Coordinates beyond it are no lengths in D."""
 LONGEST_LINE = 1000
@@ -196,6 +199,10 @@ def _line(number: int, raw: str) -> Line:
 def _curves(text: str, name: str) -> list[list[Line]]:
     """Return the points of each closed curve in the text of a file."""
     rows = re.split(r"\r\n?|\n", text)
+    if len(rows) > 3 * MOST_POINTS:
+        raise ConfigError(
+            f"{name}: has {len(rows):,} lines; an outline has {MOST_POINTS:,} points at most, thin it out"
+        )
     if len(longest := max(rows, key=len)) > LONGEST_LINE:
         raise ConfigError(f"{name}:{rows.index(longest) + 1}: a line of {len(longest):,} characters; {EXPECTED}")
     lines = [_line(number, row) for number, row in enumerate(rows, 1)]
@@ -231,6 +238,8 @@ def _parts(lines: list[Line], name: str) -> list[Part]:
         if (line.fault or line.values) and line.values != BODIES_APART and not notes:
             raise _refusal(name, line)
     points = [point for part in parts for point in part.points]
+    if len(points) > MOST_POINTS:
+        raise ConfigError(f"{name}: holds {len(points):,} points; {MOST_POINTS:,} are the most, thin them out")
     commas = [point for point in points if point.comma]
     if odd := next((point for point in commas if point.comma != commas[0].comma), None):
         raise _refusal(name, odd, f"commas {odd.comma} here, and {commas[0].comma} in line {commas[0].number}")
@@ -303,17 +312,18 @@ def _closed(curve: list[Line], name: str) -> tuple[shapely.Polygon, str]:
     if len(points) < 3:
         raise _refusal(name, curve[0], "begins a curve of too few points, three or more are needed")
     drawn = shapely.Polygon([point.values for point in points])
-    if drawn.is_valid and drawn.area > 0:
+    size = math.dist(drawn.bounds[:2], drawn.bounds[2:])
+    if drawn.is_valid and drawn.area > 1e-9 * size**2:
         return drawn, ""
-    parts = shapely.get_parts(shapely.make_valid(drawn, method="structure", keep_collapsed=False))
-    area, size = sum(part.area for part in parts), math.dist(drawn.bounds[:2], drawn.bounds[2:])
-    if not area > 1e-9 * size**2:
+    edges = shapely.linestrings([[one.values, two.values] for one, two in pairwise([*points, points[0]])])
+    x, y = map(float, (shapely.is_valid_reason(drawn).partition("[")[2].rstrip("]") or "nan nan").split())
+    parts = _parts_of(drawn, edges)
+    area = sum(part.area for part in parts)
+    if parts and not area > 1e-9 * size**2:
         raise _refusal(name, points[0], "begins a curve that encloses no area")
-    body = max(parts, key=lambda part: part.area)
-    lost, shorter = 1 - body.area / area, (drawn.length - body.length) / 2 / size
-    x, y = map(float, shapely.is_valid_reason(drawn).partition("[")[2].rstrip("]").split())
+    body = max(parts, key=lambda part: part.area, default=drawn)
+    lost, shorter = 1 - body.area / (area or math.inf), (drawn.length - body.length) / 2 / size
     if body.interiors or lost > SLIVER or shorter > SHORTENED:
-        edges = [shapely.LineString([one.values, two.values]) for one, two in pairwise([*points, points[0]])]
         nearest = np.argsort(shapely.distance(edges, shapely.Point(x, y)), kind="stable")[:2]
         one, two = sorted((points[index] for index in nearest), key=lambda point: point.number)
         remedy = "; what is in a hole has no part in the flow: leave its curve out" if body.interiors else ""
@@ -324,12 +334,24 @@ def _closed(curve: list[Line], name: str) -> tuple[shapely.Polygon, str]:
     return body, f"its sides cross at ({x:.4g}, {y:.4g}), and {100 * shorter:.2g} % of its length is cut off there"
 
 
+def _parts_of(drawn: shapely.Polygon, edges: NDArray[np.object_]) -> list[shapely.Polygon]:
+    """Return what a curve that meets itself goes around; nothing if it does so often, which takes long to sort out."""
+    if len(edges) > MOST_REPAIRED:
+        return []
+    meetings = shapely.STRtree(edges).query(edges, predicate="intersects").shape[1] - 3 * len(edges)
+    if meetings > 40:
+        return []
+    return list(shapely.get_parts(shapely.make_valid(drawn, method="structure", keep_collapsed=False)))
+
+
 def _check_apart(polygons: list[shapely.Polygon], name: str) -> None:
     """Refuse bodies that meet."""
-    for one, two in sorted(shapely.STRtree(polygons).query(polygons, predicate="intersects").T.tolist()):
-        if one >= two:
+    tree = shapely.STRtree(polygons)
+    for one, polygon in enumerate(polygons):
+        two = max(tree.query(polygon, predicate="intersects"))
+        if two == one:  # it meets none of those behind it
             continue
-        common = polygons[one].intersection(polygons[two])
+        common = polygon.intersection(polygons[two])
         x, y = common.representative_point().coords[0]
         inner, outer = sorted((one, two), key=lambda index: polygons[index].area)
         if polygons[outer].contains(polygons[inner]):

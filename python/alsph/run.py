@@ -20,6 +20,7 @@ from alsph.checkpoint import Checkpoint
 from alsph.config import Config
 from alsph.errors import AlsphError, ConfigError, DamagedError, Interrupted, RunFolderError, SolverError, WalltimeError
 from alsph.io import RunFolder, size_of
+from alsph.outline import Outline
 from alsph.progress import Reporter, duration
 from alsph.provenance import describe, peak_memory, provenance
 from alsph.results import Run
@@ -73,6 +74,8 @@ def start(config: Config, path: Path, control: Control | None = None, *, force: 
         folder.create(config, 2 * size_of(simulation.problem.state))
         if warning := config.case.time_step_warning():
             folder.log(f"warning: {warning}")
+        if isinstance(outline := getattr(config.case, "shape", None), Outline):
+            folder.log(f"outline: {outline}")
         _Driver(config, folder, simulation, {}).run(control)
     return Run(path)
 
