@@ -164,6 +164,10 @@ def test_bodies_have_forces_of_their_own_that_add_up(tmp_path):
         ("-1 -1\n1 1\n1 -1\n-1 1\n", r'foil\.txt:1: "-1 -1": .* after line 3, at \(0, 0\)'),
         (SQUARE + SQUARE, r"foil\.txt:\d: .*the curve meets itself"),
         ("0 0\n3 0\n1 0\n1 1\n", r"foil\.txt:\d: .*the curve meets itself"),
+        (
+            SQUARE.replace("5\n", "5\t\x9b31m\n").encode("latin-1"),
+            r'foil\.txt:1: "-0.5 -0.5\?\?31m": two numbers expected',
+        ),
         ("", r"foil\.txt: holds no points"),
         ("only\nwords\n", r"foil\.txt: holds no points"),
         ("solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", r"foil\.txt: holds no points"),

@@ -103,7 +103,7 @@ class Outline(Parameters):
         ConfigError
             If it holds no outline; the message names file and line.
         """
-        name = os.path.basename(path)
+        name = _shown(os.path.basename(path))
         bodies, remarks = zip(*(_closed(curve, name) for curve in _curves(_text(path), name)), strict=True)
         curves = [shapely.get_coordinates(body.exterior)[:-1].tolist() for body in bodies]
         points = "\n".join("".join(f"{x!r} {y!r}\n" for x, y in curve) for curve in curves)
@@ -133,7 +133,12 @@ class Outline(Parameters):
         """Name the file and tell what was found in it."""
         counts = ", ".join(str(len(polygon.exterior.coords) - 1) for polygon in self.polygons)
         bodies = "a body" if len(self.polygons) == 1 else f"{len(self.polygons)} bodies"
-        return f"{self.file}: {bodies} of {counts} points" + (f"; {self.remark}" if self.remark else "")
+        return _shown(f"{self.file}: {bodies} of {counts} points" + (f"; {self.remark}" if self.remark else ""))
+
+
+def _shown(text: str) -> str:
+    """Return what a terminal can be given."""
+    return "".join(character if character.isprintable() else "?" for character in text)
 
 
 def _sha256(text: str) -> str:
@@ -302,7 +307,7 @@ def _gap(one: Line, two: Line) -> float:
 
 
 def _refusal(name: str, line: Line, fault: str = "") -> ConfigError:
-    text = line.text if len(line.text) < 60 else f"{line.text[:60]}..."
+    text = _shown(line.text if len(line.text) < 60 else f"{line.text[:60]}...")
     return ConfigError(f'{name}:{line.number}: "{text}": {fault or line.fault or "two numbers expected"}')
 
 
