@@ -129,10 +129,11 @@ def test_a_run_folder_of_old_opens_where_its_outline_is(folder, tmp_path, monkey
     assert alsph("info", "run")[0] == 0
     monkeypatch.chdir(tmp_path)
     code, _, error = alsph("info", path)
-    assert code == 2 and "shape = 'square.txt'" in error and "go to where it was run" in error
-    monkeypatch.chdir(folder)
-    resume("run", until=0.2, progress=False)
-    monkeypatch.chdir(tmp_path)
+    assert code == 2 and "square.txt': neither" in error and "go to where it was run" in error
+    (path / "square.txt").write_text(SQUARE)
+    assert alsph("info", path)[0] == 0
+    resume(path, until=0.2, progress=False)
+    (path / "square.txt").unlink()
     assert Run(path).config.case.outline.area == pytest.approx(1)
 
 
@@ -151,3 +152,11 @@ def test_a_hostile_run_folder_ends_in_one_line(shape, folder, small, alsph):
 def test_the_message_of_an_unknown_shape_names_what_there_is():
     with pytest.raises(ConfigError, match="shape = 'naca0013': neither square_cylinder nor naca0012 nor a file"):
         Body(shape="naca0013")
+
+
+def test_names_that_no_file_can_have_are_refused_in_a_file_too(tmp_path):
+    path = tmp_path / "case.toml"
+    for name in (3000 * "a", "no\\u0000file", "a/b/c", "\\u001b[31m"):
+        path.write_text(f'case = "body"\nshape = "{name}"\n')
+        with pytest.raises(ConfigError, match="neither square_cylinder nor naca0012 nor a file"):
+            config.load(path)

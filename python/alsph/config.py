@@ -1,5 +1,6 @@
 """Configuration files: a case and the settings of a run, from and to TOML."""
 
+import os
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -72,15 +73,15 @@ class Config:
         path.write_text(tomli_w.dumps(self.tables(), multiline_strings=True), encoding="utf-8")
 
 
-def from_tables(tables: dict[str, Any], folder: Path = Path()) -> Config:
+def from_tables(tables: dict[str, Any], *folders: Path) -> Config:
     """Return the configuration with these tables: ``case``, the parameters of the case, and a table ``run``.
 
     Parameters
     ----------
     tables
         The tables.
-    folder
-        Folder that the path of an outline in them starts from.
+    *folders
+        Folders that the path of an outline in them may start from; the present one if none is given.
 
     Raises
     ------
@@ -95,7 +96,8 @@ def from_tables(tables: dict[str, Any], folder: Path = Path()) -> Config:
         raise ConfigError(f"run = {run!r}: must be a table, [run]")
     shape = parameters.get("shape")
     if isinstance(shape, str) and shape not in cases.body.SHAPES:
-        parameters["shape"] = str(folder / shape)
+        paths = [folder / shape for folder in folders or (Path(),)]
+        parameters["shape"] = str(next((path for path in paths if os.path.exists(path)), paths[0]))
     case = cases.find(name)(**parameters)
     try:
         return Config(case, RunSettings(**run))
@@ -103,22 +105,22 @@ def from_tables(tables: dict[str, Any], folder: Path = Path()) -> Config:
         raise ConfigError(f"run.{error}") from None
 
 
-def load(path: str | Path, folder: Path | None = None) -> Config:
+def load(path: str | Path, *folders: Path) -> Config:
     """Read a configuration file.
 
     Parameters
     ----------
     path
         The file.
-    folder
-        Folder that the path of an outline in it starts from; its own if None.
+    *folders
+        Folders that the path of an outline in it may start from; its own if none is given.
 
     Raises
     ------
     ConfigError
         If it cannot be read or used; the message starts with the file's name.
     """
-    return read(path, lambda tables: from_tables(tables, Path(path).parent if folder is None else folder))
+    return read(path, lambda tables: from_tables(tables, *(folders or (Path(path).parent,))))
 
 
 def read(path: str | Path, make: Callable[[dict[str, Any]], Made]) -> Made:

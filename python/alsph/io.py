@@ -142,10 +142,10 @@ class RunFolder:
         """Return the resolved configuration."""
         self._require("case.toml")
         try:
-            return config.load(self._file("case.toml"), Path())
+            return config.load(self._file("case.toml"), self.path, Path())
         except ConfigError as error:
             remedy = (
-                "it is of an older alsph and does not hold the outline: put the file there, or go to where it was run"
+                "it is of an older alsph and does not hold the outline: put the file into it, or go to where it was run"
                 if "shape = '" in str(error)
                 else "the folder is damaged or was made by another version"
             )

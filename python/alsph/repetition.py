@@ -105,7 +105,7 @@ def repeat(path: str | Path, threads: int | None = None, *, progress: bool = Tru
 
 def _case(tables: Any, settings: config.RunSettings, folder: RunFolder) -> Config:
     try:
-        return Config(config.from_tables(tables).case, settings)
+        return Config(config.from_tables(tables, folder.path, Path()).case, settings)
     except (ConfigError, TypeError) as error:
         raise RunFolderError(f"{folder.path}/run.json: the case of a segment cannot be used: {error}") from None
 

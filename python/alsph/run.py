@@ -189,7 +189,7 @@ def _changes(now: Config, saved: Checkpoint, folder: RunFolder) -> list[str]:
     if then == tables:
         return []
     try:
-        before = config.from_tables(then).case
+        before = config.from_tables(then, folder.path, Path()).case
     except ConfigError as error:
         raise RunFolderError(f"{folder.path}: the case of its checkpoint cannot be used: {error}") from None
     old, new = (case.problem(saved.state).settings for case in (before, now.case))

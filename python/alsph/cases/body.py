@@ -25,9 +25,10 @@ if TYPE_CHECKING:
 class Body(Channel):
     """Flow past a body of any shape in a channel with free-slip walls and uniform inflow U.
 
-    D is the side of the square, the chord of the airfoil, or the unit of the file's lengths (see
-    :mod:`alsph.outline`). The centroid, of all bodies together if the file has several, lies at (upstream, 0). The
-    solid particles follow the surface; parts thinner than about 2Δx are badly resolved.
+    D is the side of the square, the chord of the airfoil, or the unit of the file's lengths. A file holds points, two
+    numbers a line, in any of the usual orders and forms; several closed curves are several bodies. The centroid, that
+    of all of them together, lies at (upstream, 0). The solid particles follow the surface; parts thinner than about
+    2Δx are badly resolved.
     """
 
     name: ClassVar[str] = "body"
