@@ -3,7 +3,8 @@
 import json
 import math
 import time as clock
-from collections.abc import Callable, Iterator
+import warnings
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -12,10 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from alsph import _alsph
 from alsph.errors import ConfigError, SolverError
-from alsph.geometry import FloatArray, Problem
-
-Inflow = Callable[[FloatArray, float], ArrayLike]
-"""Velocity (m, d) or (d,) of the inlet particles, from their positions (m, d) and the time."""
+from alsph.geometry import FloatArray, Kind, Problem
+from alsph.inflow import Inflow, Prescription, backflow
 
 SLICE_SECONDS = 0.2
 """Longest time in the engine without a look at signals, so that Ctrl-C works."""
@@ -59,12 +58,28 @@ class Simulation:
     ------
     ConfigError
         If the settings or the particles cannot be used.
+
+    Warns
+    -----
+    RuntimeWarning
+        Once, if fluid is to leave through an inlet in places (:attr:`backflow`).
+
+    Attributes
+    ----------
+    inflow : function, optional
+        The rule that :meth:`set_inflow` was given.
+    prescribed : Prescription, optional
+        What it gave before the last step.
+    backflow : str
+        The warning of fluid that leaves through an inlet; empty without.
     """
 
     def __init__(self, problem: Problem, threads: int | None = None, until: float = math.inf) -> None:
         self.problem = problem
         self.until = until
-        self._inflow: Inflow | None = None
+        self.inflow: Inflow | None = None
+        self.prescribed: Prescription | None = None
+        self.backflow = ""
         self._history: list[dict[str, NDArray[Any]]] = []
         self._start(problem.state, threads)
 
@@ -73,6 +88,8 @@ class Simulation:
             raise ConfigError(f"threads = {threads}: must be 1 or more")
         with _translated():
             self._engine = _alsph.Simulation(json.dumps(self.problem.settings), state, threads)
+        inlet = np.asarray(state["kind"]) == Kind.INLET
+        self._check_inflow(np.asarray(state["position"])[inlet], np.asarray(state["velocity"])[inlet])
 
     def __repr__(self) -> str:
         """Name the time, the step and the particles."""
@@ -112,7 +129,7 @@ class Simulation:
             left = first + steps - self.step
             if left <= 0:
                 break
-            with _translated():
+            with self._stepping():
                 self._engine.advance(self._prescribe(left), seconds)
         return self.step - first
 
@@ -129,7 +146,7 @@ class Simulation:
         for seconds in _slices(wall_seconds):
             if self.time >= time:
                 break
-            with _translated():
+            with self._stepping():
                 if self._prescribe(2) == 1:
                     self._engine.advance(1)
                 else:
@@ -221,21 +238,61 @@ class Simulation:
         Parameters
         ----------
         velocity
-            An array (d,) or, in the order of :meth:`inflow_position`, (m, d); or a function of their positions (m, d)
-            and the time that returns such an array and is called before every step.
+            An array (d,) or, in the order of :meth:`inflow_position`, (m, d), which the particles keep and hand on to
+            those that follow them [U]; or a function of their positions (m, d) [D] and the time [D/U] that returns such
+            an array and is called before every step. The rule of a case is better its :meth:`alsph.cases.Case.inflow`.
+
+        Raises
+        ------
+        ConfigError
+            If it is no such array, or more fluid would leave through an inlet than enter.
         """
-        self._inflow = velocity if callable(velocity) else None
-        if not callable(velocity):
-            with _translated():
-                self._engine.set_inflow(np.ascontiguousarray(velocity, float))
+        self.inflow, self.prescribed = (velocity if callable(velocity) else None), None
+        if callable(velocity):
+            nothing = self.inflow_position()[:0]
+            self.prescribed = Prescription(self.time, nothing, nothing)
+        else:
+            self._apply(velocity, self.inflow_position())
 
     def _prescribe(self, steps: int) -> int:
         """Apply an inflow given as a function; return how many of `steps` may be taken until it is due again."""
-        if self._inflow is None:
+        if self.inflow is None:
             return steps
-        velocity = self._inflow(self.inflow_position(), self.time)
-        self._engine.set_inflow(np.ascontiguousarray(velocity, float))
+        position = self.inflow_position()
+        velocity = self.inflow(position.copy(), self.time)
+        if velocity is not None:
+            self.prescribed = Prescription(self.time, position, self._apply(velocity, position))
         return 1
+
+    def _apply(self, velocity: ArrayLike, position: FloatArray) -> FloatArray:
+        """Give the inlet particles at `position` (m, d) a velocity, (d,) or (m, d), and return it as (m, d)."""
+        try:
+            values = np.ascontiguousarray(velocity, float)
+        except (TypeError, ValueError) as error:
+            raise ConfigError(f"inflow: must be an array of numbers, one velocity or one a particle: {error}") from None
+        with _translated():
+            self._engine.set_inflow(values)  # refuses wrong shapes
+        every = np.broadcast_to(values, position.shape)
+        self._check_inflow(position, every)
+        return every
+
+    def _check_inflow(self, position: FloatArray, velocity: FloatArray) -> None:
+        """Refuse backflow at an inlet, and warn once of such in places."""
+        warning = backflow(self.problem.settings["domain"], position, velocity, self.time)
+        if warning and not self.backflow:
+            self.backflow = warning
+            warnings.warn(warning, RuntimeWarning, stacklevel=4)
+
+    @contextmanager
+    def _stepping(self) -> Iterator[None]:
+        """Translate the engine's errors; a breakdown after backflow tells of that."""
+        try:
+            with _translated():
+                yield
+        except SolverError as error:
+            if not self.backflow:
+                raise
+            raise SolverError(f"{error}; before, {self.backflow}") from None
 
     def state(self) -> dict[str, Any]:
         """Return all that :meth:`restore` needs to go on from here to the last bit (an inflow function excepted)."""
@@ -245,6 +302,8 @@ class Simulation:
         """Go back to a state that :meth:`state` has returned; the history starts anew."""
         self._start(state, self.threads)
         self._history = []
+        if self.inflow is not None:
+            self.set_inflow(self.inflow)
 
 
 def next_multiple(time: float, interval: float) -> float:
