@@ -18,7 +18,6 @@ from alsph.cases import Case
 from alsph.config import Config
 from alsph.errors import ConfigError, SolverError
 from alsph.progress import duration
-from alsph.simulation import Simulation
 from alsph.tables import markdown
 
 RUNGS = 2**0.5
@@ -196,7 +195,7 @@ class _Tuner:
         self.probes: list[Probe] = []
         developed = case.replace(adaptive_time_step=True, adaptive_until=None)
         self._say(f"developing the flow to t* = {develop:g}")
-        simulation = Simulation(developed.build(), threads)
+        simulation = developed.simulation(threads)
         started = clock.monotonic()
         while not simulation.run_until(develop, wall_seconds=10.0):
             left = (clock.monotonic() - started) * (develop / simulation.time - 1) if simulation.time else math.nan
@@ -242,7 +241,7 @@ class _Tuner:
         if iterations is not None:
             changes |= {"max_iterations": iterations, "projection_sweeps": sweeps}
         case = self.case.replace(**changes)
-        simulation = Simulation(case.problem(self.state), self.threads)
+        simulation = case.restored(self.state, self.threads)
         started, stable = clock.process_time(), True
         try:
             simulation.run_until(self.state["time"] + self.length)

@@ -2,8 +2,8 @@
 
 The first 512 bytes, which HDF5 leaves to its user, hold the format's name and version and the SHA-256 of all that
 follows, so that a damaged file is refused before the HDF5 library sees it. Behind them are the arrays of
-:meth:`alsph.Simulation.state`, its numbers as attributes, and the case as the bytes of a JSON text. Version 1 had
-neither head nor case.
+:meth:`alsph.Simulation.state`, its numbers as attributes, the case as the bytes of a JSON text and, where the inflow is
+prescribed by a rule, what it gave last. Version 1 had neither head nor case.
 """
 
 import hashlib
@@ -18,6 +18,7 @@ import numpy as np
 
 from alsph.durable import replacing
 from alsph.errors import DamagedError, RunFolderError
+from alsph.inflow import Prescription
 from alsph.reading import DAMAGE, sound
 
 VERSION = 2
@@ -25,6 +26,7 @@ HEAD_BYTES = 512
 NAME = b"alsph checkpoint"
 HDF5 = b"\x89HDF\r\n\x1a\n"
 CASE = "case"
+INFLOW = {"time": "inflow_time", "position": "inflow_position", "velocity": "inflow_velocity"}
 ARRAYS = ("position", "velocity", "pressure", "kind", "body", "normal", "depth", "id")
 READ_BYTES = 2**20
 
@@ -41,14 +43,23 @@ class Checkpoint:
         The tables of the case that the run was made with; None in a checkpoint of version 1.
     warning : str
         Why it is not the newest one.
+    inflow : Prescription, optional
+        What the rule for the inflow gave last; None without a rule, and in a checkpoint of an older alsph.
     """
 
     state: dict[str, Any]
     case: dict[str, Any] | None
     warning: str = ""
+    inflow: Prescription | None = None
 
 
-def write(path: Path, previous: Path, state: dict[str, Any], case: dict[str, Any]) -> None:
+def write(
+    path: Path,
+    previous: Path | None,
+    state: dict[str, Any],
+    case: dict[str, Any],
+    inflow: Prescription | None = None,
+) -> None:
     """Write a checkpoint; the one that was there becomes `previous`."""
     content = io.BytesIO()  # the HDF5 library does not bear a disk that fails
     with h5py.File(content, "w", userblock_size=HEAD_BYTES) as file:
@@ -58,6 +69,8 @@ def write(path: Path, previous: Path, state: dict[str, Any], case: dict[str, Any
                 file.create_dataset(name, data=value, compression="gzip", compression_opts=1, shuffle=True)
             else:
                 file.attrs[name] = value
+        for name, key in INFLOW.items() if inflow else ():
+            file[key] = np.atleast_1d(getattr(inflow, name))
     head = b"%s\nversion %d\nsha256 %s\n" % (NAME, VERSION, _hash(content).encode())
     content.seek(0)
     content.write(head.ljust(HEAD_BYTES, b"\0"))
@@ -87,11 +100,12 @@ def read(path: Path) -> Checkpoint:
             state = {name: _number(file, name) for name in file.attrs}
             state |= {name: sound(file, name)[()] for name in ARRAYS if name in file}
             case = json.loads(sound(file, CASE)[()].tobytes()) if CASE in file else None
+            inflow = _inflow(file)
         if not isinstance(case, dict | None):
             raise ValueError("its case is no table")
         if not state.keys() >= {"time", "step", "position"}:
             raise ValueError("it has no time, step or position")
-        return Checkpoint(state, case)
+        return Checkpoint(state, case, inflow=inflow)
     except DAMAGE as error:
         raise DamagedError(f"{path}: not a checkpoint, or damaged: {error}") from None
 
@@ -114,6 +128,16 @@ def _number(file: h5py.File, name: str) -> Any:
     if attribute.dtype.kind not in "iufb" or attribute.shape != ():
         raise ValueError(f"{name} is no number")
     return file.attrs[name].item()
+
+
+def _inflow(file: h5py.File) -> Prescription | None:
+    """Return what the rule for the inflow gave last, if there was one."""
+    if INFLOW["time"] not in file:
+        return None
+    time, position, velocity = (np.asarray(sound(file, key)[()], float) for key in INFLOW.values())
+    if time.shape != (1,) or position.ndim != 2 or position.shape != velocity.shape:
+        raise ValueError("its inflow is incomplete")
+    return Prescription(float(time[0]), position, velocity)
 
 
 def _check_head(path: Path) -> None:

@@ -51,7 +51,7 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
             lines.append((f"{name.replace('_', ' ')} limit", text))
     lines.append(("steps", f"about {steps:,.0f} to t* = {config.until:g}"))
     if probe:
-        seconds = _seconds_per_step(Simulation(problem, config.run.threads))
+        seconds = _seconds_per_step(case.restored(problem.state, config.run.threads))
         lines.append(("estimated time", f"{duration(seconds * steps)} at {seconds:.3g} s a step"))
     if warning := case.time_step_warning():
         lines.append(("warning", warning))

@@ -26,6 +26,7 @@ from alsph.checkpoint import Checkpoint
 from alsph.durable import flush, growing, replacing
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.geometry import FloatArray
+from alsph.inflow import Prescription
 from alsph.reading import DAMAGE, sound
 
 try:
@@ -36,6 +37,8 @@ except ImportError:  # Windows
 AXES = ("x", "y", "z")
 LOCK = ".lock"
 CHECKPOINTS = ("checkpoint.h5", "checkpoint.previous.h5")
+START = "start.h5"
+"""The particles that a run began with, in the form of a checkpoint, where they are not its case's own."""
 SPARE_BYTES = 2 * 2**20
 """Room that must stay free on the disk beside what is written next."""
 PATIENCE_SECONDS = 2.0
@@ -210,13 +213,23 @@ class RunFolder:
                 vtkhdf.append(temporary, time, particles)
         return path
 
-    def write_checkpoint(self, state: dict[str, Any], case: dict[str, Any]) -> None:
+    def write_start(self, state: dict[str, Any], case: dict[str, Any]) -> None:
+        """Write ``start.h5``."""
+        self._make_room(size_of(state))
+        with self._writing():
+            checkpoint.write(self._file(START), None, state, case)
+
+    def read_start(self) -> dict[str, Any] | None:
+        """Return the particles that the run began with, None if they are those of its case."""
+        return checkpoint.read(self._file(START)).state if self._file(START).exists() else None
+
+    def write_checkpoint(self, state: dict[str, Any], case: dict[str, Any], inflow: Prescription | None = None) -> None:
         """Write ``checkpoint.h5``; the one before is kept. The history up to it is made safe first."""
         self._make_room(size_of(state))
         with self._writing():
             if self._file("history.csv").exists():
                 flush(self._file("history.csv"))
-            checkpoint.write(self._file(CHECKPOINTS[0]), self._file(CHECKPOINTS[1]), state, case)
+            checkpoint.write(self._file(CHECKPOINTS[0]), self._file(CHECKPOINTS[1]), state, case, inflow)
 
     def has_checkpoint(self) -> bool:
         """Whether there is a checkpoint, be it damaged."""

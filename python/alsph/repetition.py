@@ -1,16 +1,23 @@
 """Repeating a run: the same steps again, compared with what its folder holds."""
 
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from alsph import checkpoint, config
+from alsph import beginning, checkpoint, config
 from alsph.config import Config
-from alsph.errors import ConfigError, RunFolderError
-from alsph.io import RunFolder, history_lines
+from alsph.errors import ConfigError, DamagedError, RunFolderError
+from alsph.inflow import difference
+from alsph.io import START, RunFolder, history_lines
 from alsph.progress import Reporter
 from alsph.provenance import provenance
 from alsph.simulation import SLICE_SECONDS, Simulation
+
+UNLIKE_START = (
+    "the particles at the start are not those that the run began with: another NumPy or another alsph places them "
+    "otherwise"
+)
 
 
 @dataclass(frozen=True)
@@ -75,10 +82,12 @@ def repeat(path: str | Path, threads: int | None = None, *, progress: bool = Tru
     parts = [(int(part["step"]), _case(part["case"], settings, folder)) for part in info["segments"]]
     if parts[0][0] != 0:
         raise RunFolderError(f"{path}/run.json knows the run from step {parts[0][0]} on only; it cannot be repeated")
-    simulation = parts[0][1].case.simulation(threads)
+    beginning.check_class(parts[0][1].case, info, folder.path)
+    simulation = _begun(parts[0][1], threads, folder, info)
     bodies = [body["name"] for body in simulation.problem.settings["bodies"]]
     recorded = folder.path / "history.csv"
-    difference, until = "", parts[-1][1].until
+    start, until = info.get("start", {}).get("state_sha256"), parts[-1][1].until
+    unequal = "" if start in (None, checkpoint.digest(simulation.state())) else UNLIKE_START
     if not recorded.is_file():
         raise RunFolderError(f"{path}: {recorded.name} is missing, with which the repetition is compared")
     with recorded.open(encoding="utf-8", errors="replace") as file, Reporter(until, 0.0, enabled=progress) as reporter:
@@ -86,21 +95,49 @@ def repeat(path: str | Path, threads: int | None = None, *, progress: bool = Tru
         ends = [*(step for step, _ in parts[1:]), int(info["checkpoint"]["step"])]
         for (_, part), end in zip(parts, ends, strict=True):
             if simulation.step:
-                simulation = Simulation(part.case.problem(simulation.state()), threads)
-            while simulation.step < end and not difference:
+                simulation = part.case.restored(simulation.state(), threads)
+            while simulation.step < end and not unequal:
                 simulation.advance(end - simulation.step, SLICE_SECONDS)
                 rows = simulation.new_history(keep=False)
                 reporter.update(rows)
                 for line in history_lines(rows, bodies):
-                    difference = difference or _difference(names, next(file, ""), line)
-    now, then = provenance(simulation.threads), info
-    facts = ("versions", "commit", "instructions", "threads")
+                    unequal = unequal or _difference(names, next(file, ""), line)
     return Repetition(
         steps=simulation.step,
         same_state=checkpoint.digest(simulation.state()) == info["checkpoint"]["state_sha256"],
-        first_difference=difference,
-        environment=[f"{name}: {now[name]}, was {then.get(name)}" for name in facts if now[name] != then.get(name)],
+        first_difference=unequal,
+        environment=_environment(simulation, folder, info),
     )
+
+
+def _environment(simulation: Simulation, folder: RunFolder, then: dict[str, Any]) -> list[str]:
+    """Say what is not as it was when the run was made."""
+    now, facts = provenance(simulation.threads), ("versions", "commit", "instructions", "threads")
+    found = [f"{name}: {now[name]}, was {then.get(name)}" for name in facts if now[name] != then.get(name)]
+    with contextlib.suppress(DamagedError):  # of which a repetition needs nothing else
+        if change := difference(simulation.inflow, folder.read_checkpoint().inflow):
+            found.append(change)
+    return found
+
+
+def _begun(first: Config, threads: int | None, folder: RunFolder, info: dict[str, Any]) -> Simulation:
+    """Return a simulation at the start of a run, with the flow that it began with."""
+    cannot = f"{folder.path}: cannot be repeated because"
+    try:
+        state = folder.read_start()
+    except DamagedError as error:
+        raise RunFolderError(f"{cannot} the flow that it began with is damaged: {error}") from None
+    start = info.get("start")
+    initial = first.run.initial_run if start is None else start.get("initial_run")  # an older alsph has no `start`
+    if state is None and initial is not None:
+        raise RunFolderError(f"{cannot} it began with the flow of another run, '{initial}', and has no {START}")
+    simulation = first.case.restored(state, threads) if state else first.case.simulation(threads)
+    if info.get("inflow_function") and not simulation.inflow:
+        raise RunFolderError(
+            f"{cannot} a function prescribes its inflow, and its case does not tell of any; make it the method "
+            "`inflow` of the case's class"
+        )
+    return simulation
 
 
 def _case(tables: Any, settings: config.RunSettings, folder: RunFolder) -> Config:

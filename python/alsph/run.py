@@ -15,10 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from alsph import checkpoint, config
+from alsph import beginning, checkpoint, config
 from alsph.checkpoint import Checkpoint
 from alsph.config import Config
 from alsph.errors import AlsphError, ConfigError, DamagedError, Interrupted, RunFolderError, SolverError, WalltimeError
+from alsph.inflow import difference
 from alsph.io import RunFolder, size_of
 from alsph.outline import Outline
 from alsph.progress import Reporter, duration
@@ -69,22 +70,25 @@ def start(config: Config, path: Path, control: Control | None = None, *, force: 
     control, folder = control or Control(), RunFolder(path)
     folder.check_new(force=force)
     simulation = config.case.simulation(config.run.threads, config.run.initial_run)
+    remarks, info = beginning.of(config)
     with folder.claimed():
         folder.check_new(force=force)  # another process may have been faster
-        folder.create(config, 2 * size_of(simulation.problem.state))
-        if warning := config.case.time_step_warning():
-            folder.log(f"warning: {warning}")
+        folder.create(config, 3 * size_of(simulation.problem.state))
+        for remark in remarks:
+            folder.log(f"warning: {remark}")
         if isinstance(outline := getattr(config.case, "shape", None), Outline):
             folder.log(f"outline: {outline}")
-        _Driver(config, folder, simulation, {}).run(control)
+        if config.run.initial_run is not None:
+            folder.write_start(simulation.state(), config.case_tables())
+        _Driver(config, folder, simulation, {"start": info}).run(control)
     return Run(path)
 
 
 def complete(config: Config, path: Path, control: Control | None = None) -> Run:
     """Return the finished run of a case in a folder: as it is there, resumed, or run from the start.
 
-    A folder with another case in it, or without a checkpoint that can be read, is replaced. The number of threads is
-    that of `config`.
+    A folder with another case, inflow or beginning in it, or without a checkpoint that can be read, is replaced. The
+    number of threads is that of `config`.
     """
     if (path / "case.toml").exists():
         folder = RunFolder(path)
@@ -92,7 +96,8 @@ def complete(config: Config, path: Path, control: Control | None = None) -> Run:
         info = folder.last_info()
         # Retries shorten the time step: the run is still that of the case that it began with.
         began = info.get("began", {}) if info.get("retries") else kept.case_tables()
-        if (began, kept.until) == (config.case_tables(), config.until):
+        alike = (began, kept.until) == (config.case_tables(), config.until)
+        if alike and beginning.alike(config, kept, info) and _same_inflow(config, folder, info):
             if info.get("status") == "finished":
                 return Run(path)
             try:
@@ -146,6 +151,7 @@ def _resume(folder: RunFolder, until: float | None, threads: int | None, control
     with folder.claimed():
         config, info = folder.config(), folder.last_info()
         _check_parameters(config, folder)
+        beginning.check_class(config.case, info, folder.path)
         changes = {name: value for name, value in (("until", until), ("threads", threads)) if value is not None}
         own_end, config = config.until, Config(config.case, config.run.replace(**changes))
         saved = folder.read_checkpoint()
@@ -161,6 +167,9 @@ def _resume(folder: RunFolder, until: float | None, threads: int | None, control
         elif changed := _changes(config, saved, folder):
             remarks.append(f"goes on with other settings than before: {', '.join(changed)}")
         simulation = _restored(config, saved, folder)
+        if change := difference(simulation.inflow, saved.inflow):
+            remarks.append(f"goes on with {change}")
+        remarks += beginning.changed(config, info)
         if saved.warning:
             folder.set_damaged_aside()
         remarks += folder.truncate(simulation.step, simulation.time)
@@ -206,9 +215,22 @@ def _changes(now: Config, saved: Checkpoint, folder: RunFolder) -> list[str]:
 
 def _restored(config: Config, saved: Checkpoint, folder: RunFolder) -> Simulation:
     try:
-        return Simulation(config.case.problem(saved.state), config.run.threads)
+        simulation = config.case.restored(saved.state, config.run.threads)
     except ConfigError as error:
         raise RunFolderError(f"{folder.path}: its checkpoint does not fit its case: {error}") from None
+    beginning.check_inflow(simulation, saved.inflow, folder.path)
+    return simulation
+
+
+def _same_inflow(config: Config, folder: RunFolder, info: dict[str, Any]) -> bool:
+    """Whether a run's inflow, where it is prescribed by a function, is still that of the case."""
+    if not (config.case.has_inflow or info.get("inflow_function")):
+        return True
+    try:
+        saved = folder.read_checkpoint()
+        return not difference(_restored(config, saved, folder).inflow, saved.inflow)
+    except RunFolderError:
+        return False
 
 
 class _Driver:
@@ -223,11 +245,14 @@ class _Driver:
         last = self.retries[-1] if self.retries else None
         if last and last["step"] == simulation.step and last["time_step"] < config.case.time_step:
             self.retries.pop()  # killed between its note and the new time step: it has not taken effect
+        self.start: dict[str, Any] | None = info.get("start")  # None: an older alsph began it
         self.began = info.get("began", config.case_tables()) if self.retries else config.case_tables()
-        self.rewound = False
+        self.rewound = self.logged_backflow = False
         self.time_step = math.inf
         self.pause = 0.0
         self._go_on_with(config, simulation)
+        if self.start is not None and simulation.step == 0:
+            self.start["state_sha256"] = self.saved["state_sha256"]
 
     def _go_on_with(self, config: Config, simulation: Simulation) -> None:
         """Take a case and a simulation of it, and note from which step on."""
@@ -298,6 +323,9 @@ class _Driver:
         """Write what is due, and return the new rows of the history."""
         rows, now, time = self.simulation.new_history(keep=False), clock.monotonic(), self.simulation.time
         self.unwritten.append(rows)
+        if self.simulation.backflow and not self.logged_backflow:
+            self.folder.log(f"warning: {self.simulation.backflow}")
+            self.logged_backflow = True
         if len(rows["time_step"]):
             self.time_step = float(rows["time_step"][-1])
         if time >= self.next_surface:
@@ -337,7 +365,7 @@ class _Driver:
             self.samples = []
         if self.written != self.simulation.step:  # else it is there, and must not displace the one before
             state = self.simulation.state()
-            self.folder.write_checkpoint(state, self.config.case_tables())
+            self.folder.write_checkpoint(state, self.config.case_tables(), self.simulation.prescribed)
             self._note_checkpoint(state)
             self.rewound, self.written = False, self.simulation.step
         self._write_status(status)
@@ -391,10 +419,14 @@ class _Driver:
             "seconds": seconds,
             "peak_memory_bytes": peak_memory(),
             "pid": os.getpid(),
+            "case_class": type(self.config.case).__qualname__,
+            "inflow_function": self.simulation.inflow is not None,
             "began": self.began,
             "segments": self.segments,
             "retries": self.retries,
         }
+        if self.start is not None:
+            facts["start"] = self.start
         self.folder.write_info(facts | self.provenance)
         if status != "running":
             self.folder.log(f"{status} at {self.where} after {duration(seconds)}. {message}")

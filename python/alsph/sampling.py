@@ -99,10 +99,11 @@ def late_velocity(run: Run, points: FloatArray, share: float = 0.25) -> FloatArr
     return total / len(late) if len(late) else np.full_like(points, np.nan)
 
 
-def initial_state(state: dict[str, Any], run: Run) -> dict[str, Any]:
-    """Particles with the velocity and pressure of the last snapshot of another run, in fluid and buffers.
+def initial_state(state: dict[str, Any], run: Run, *, outlet: bool = True) -> dict[str, Any]:
+    """Particles with the velocity and pressure of the last snapshot of another run.
 
-    Solids keep what they have, and so do particles further than 1.5 Δx of that run from all its fluid.
+    Solids keep what they have, the inlet's particles their velocities, which are prescribed, and the outlet's their
+    pressures; so do particles further than 1.5 Δx of that run from all its fluid.
 
     Parameters
     ----------
@@ -110,6 +111,8 @@ def initial_state(state: dict[str, Any], run: Run) -> dict[str, Any]:
         Particles of a case at its start, one array a property.
     run : Run
         The other run, at any resolution and of any Reynolds number.
+    outlet : bool
+        Whether the outlet's particles take its velocities, too; where not, they let out what its own inflow brings.
 
     Raises
     ------
@@ -125,11 +128,14 @@ def initial_state(state: dict[str, Any], run: Run) -> dict[str, Any]:
     source = snapshot.position[snapshot.fluid]
     fields = np.column_stack([snapshot.velocity, snapshot.pressure])[snapshot.fluid]
     near = KDTree(source).query(state["position"])[0] < VOID * run.spacing
+    takers = {"velocity": [Kind.FLUID, *[Kind.OUTLET] * outlet], "pressure": [Kind.FLUID, Kind.INLET]}
+    started = state | {name: state[name].copy() for name in takers}
     chosen = np.flatnonzero(near & (state["kind"] != Kind.SOLID))
-    started = state | {name: state[name].copy() for name in ("velocity", "pressure")}
     for some in np.array_split(chosen, 1 + len(chosen) // CHUNK):
         values, _ = interpolate(source, fields, state["position"][some], run.spacing)
-        started["velocity"][some], started["pressure"][some] = values[:, :-1], values[:, -1]
+        for name, columns in (("velocity", values[:, :-1]), ("pressure", values[:, -1])):
+            taking = np.isin(state["kind"][some], takers[name])
+            started[name][some[taking]] = columns[taking]
     return started
 
 

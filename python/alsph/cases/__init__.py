@@ -41,5 +41,6 @@ def find(name: str) -> type[Case]:
         If there is none.
     """
     if name not in CASES:
-        raise ConfigError(f"unknown case '{name}'; {suggest(name, CASES)}")
+        own = "a case of your own must be put into alsph.cases.CASES before"
+        raise ConfigError(f"unknown case '{name}'; {suggest(name, CASES)} ({own})")
     return CASES[name]

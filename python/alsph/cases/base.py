@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from alsph.errors import ConfigError
@@ -42,6 +42,8 @@ class Case(Parameters):
     """Expected largest velocity in U, for estimates of the time step."""
     made_for: ClassVar[tuple[str, ...]] = ()
     """Parameters that the particles are made for beside what the engine's settings tell: no run changes them."""
+    of_the_start: ClassVar[tuple[str, ...]] = ()
+    """Parameters of the case that nothing but its own start depends on."""
 
     reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, ge=8, description="particles per reference length, D/Δx [-]")
@@ -144,6 +146,31 @@ class Case(Parameters):
         """Names of the bodies that drag and lift are those of, all together."""
         return []
 
+    def inflow(self, position: FloatArray, time: float) -> ArrayLike | None:
+        """Return the velocity of the inlet particles, which is asked for before every step.
+
+        A case without this method, such as all that come with alsph, gives them their velocities in :meth:`particles`:
+        they keep them and hand them on to those that follow.
+
+        Parameters
+        ----------
+        position
+            Any positions (m, d) [D].
+        time
+            Any time [D/U].
+
+        Returns
+        -------
+        array or None
+            Velocities (m, d), or one (d,), by position and time alone [U]; None: those that they have.
+        """
+        return None
+
+    @property
+    def has_inflow(self) -> bool:
+        """Whether the case has a rule of its own for the inflow."""
+        return type(self).inflow is not Case.inflow
+
     def surface_points(self) -> tuple[FloatArray, FloatArray] | None:
         """Return ``angle`` (m,) [degrees from the front] and ``position`` (m, d) of the C_p samples."""
         return None
@@ -226,24 +253,50 @@ class Case(Parameters):
         threads
             Number of threads; all cores if None.
         initial_run
-            Run folder whose last flow this one starts with (:func:`alsph.sampling.initial_state`); the case's own
-            start if None.
+            Run folder whose last flow this one starts with (:func:`alsph.beginning.started`); the case's own start if
+            None. The inflow stays that of the case.
+
+        Warns
+        -----
+        RuntimeWarning
+            If `initial_run` is of another case or geometry, or has not finished.
 
         Raises
         ------
         ConfigError, RunFolderError
             If the case does not fit into memory, or the flow of `initial_run` cannot be used.
         """
+        from alsph import beginning
         from alsph.results import Run
-        from alsph.sampling import initial_state
-        from alsph.simulation import Simulation
 
         problem = self.build()
         if initial_run is not None:
-            problem = self.problem(initial_state(problem.state, Run(initial_run)))
+            problem = self.problem(beginning.started(self, problem.state, Run(initial_run)))
         if warning := self.time_step_warning():
             warnings.warn(warning, stacklevel=2)
-        return Simulation(problem, threads, until=self.default_until)
+        return self._simulation(problem, threads)
+
+    def restored(self, state: dict[str, Any], threads: int | None = None) -> Simulation:
+        """Return a simulation of this case that goes on from a state, for instance one from a checkpoint.
+
+        Raises
+        ------
+        ConfigError
+            If the state does not fit the case.
+        """
+        if type(self).simulation is Case.simulation:
+            return self._simulation(self.problem(state), threads)
+        simulation = self.simulation(threads)  # it may do more, such as prescribe an inflow
+        simulation.restore(state)
+        return simulation
+
+    def _simulation(self, problem: Problem, threads: int | None) -> Simulation:
+        from alsph.simulation import Simulation
+
+        simulation = Simulation(problem, threads, until=self.default_until)
+        if self.has_inflow:
+            simulation.set_inflow(self.inflow)
+        return simulation
 
     def run(
         self,

@@ -26,6 +26,7 @@ class Channel(Case):
     """
 
     velocity_max: ClassVar[float] = 1.5
+    of_the_start: ClassVar[tuple[str, ...]] = ("perturbation",)
     body_name: ClassVar[str]
 
     reynolds: float = Field(default=200.0, gt=0, description="Reynolds number UD/ν [-]")

@@ -12,11 +12,13 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from alsph import config
+from alsph import beginning, config
 from alsph.config import Config
 from alsph.errors import ConfigError
+from alsph.inflow import fingerprint
 from alsph.parameters import Parameters, suggest
 from alsph.plotting import field_style
+from alsph.results import Run
 
 UNHASHED = ("threads", "checkpoint_minutes", "flush_seconds")
 """Settings of a run that change nothing in its results."""
@@ -206,9 +208,22 @@ class Study(Parameters):
 
 
 def digest(configuration: Config, *without: str) -> str:
-    """Return a hash, in hexadecimal digits, of all that a run's result depends on, some parameters excepted."""
+    """Return a hash, in hexadecimal digits, of all that a run's result depends on, some parameters excepted.
+
+    A run that it begins with counts by its last flow, whatever it is called; an inflow by the velocities that it gives.
+
+    Raises
+    ------
+    RunFolderError
+        If there is no flow in the run that it begins with.
+    """
     tables = {name: value for name, value in configuration.tables().items() if name not in without}
     tables["run"] = {name: value for name, value in tables["run"].items() if name not in UNHASHED}
+    case, initial = configuration.case, configuration.run.initial_run
+    if initial is not None:
+        tables["run"]["initial_run"] = beginning.flow_sha256(Run(initial))
+    if case.has_inflow:
+        tables["inflow"] = fingerprint(case.inflow, case.domain(), configuration.until)
     return hashlib.sha256(json.dumps(tables, sort_keys=True).encode()).hexdigest()
 
 
