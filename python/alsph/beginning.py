@@ -11,9 +11,11 @@ import numpy as np
 
 from alsph import cases, sampling
 from alsph.cases.base import Case
+from alsph.checkpoint import Checkpoint
 from alsph.config import Config
-from alsph.errors import RunFolderError
-from alsph.inflow import Prescription
+from alsph.errors import ConfigError, RunFolderError
+from alsph.inflow import difference
+from alsph.io import RunFolder
 from alsph.results import Run
 
 if TYPE_CHECKING:
@@ -105,10 +107,14 @@ def changed(config: Config, info: dict[str, Any]) -> list[str]:
     return [] if now == before else [f"initial_run = {now!r} has no effect: the run has begun with {before!r}"]
 
 
-def alike(config: Config, kept: Config, info: dict[str, Any]) -> bool:
-    """Whether the run in a folder, of which ``run.json`` says `info`, began as one of this configuration would."""
+def alike(config: Config, kept: Config, folder: RunFolder, info: dict[str, Any]) -> bool:
+    """Whether a run, of which `kept` and `info` tell, has the class, beginning and inflow of this configuration."""
     if info.get("case_class", type(config.case).__qualname__) != type(config.case).__qualname__:
         return False
+    return _same_flow(config, kept, info) and _same_inflow(config, folder, info)
+
+
+def _same_flow(config: Config, kept: Config, info: dict[str, Any]) -> bool:
     initial, recorded = config.run.initial_run, info.get("start", {}).get("flow_sha256")
     if initial is None or recorded is None:  # an older alsph did not record it
         return initial == kept.run.initial_run
@@ -116,6 +122,17 @@ def alike(config: Config, kept: Config, info: dict[str, Any]) -> bool:
         return bool(flow_sha256(Run(initial)) == recorded)
     except RunFolderError:  # it is gone, and not needed any more
         return initial == kept.run.initial_run
+
+
+def _same_inflow(config: Config, folder: RunFolder, info: dict[str, Any]) -> bool:
+    """Whether a run's inflow, where it is prescribed by a function, is still that of the case."""
+    if not (config.case.has_inflow or info.get("inflow_function")):
+        return True
+    try:
+        saved = folder.read_checkpoint()
+        return not difference(restored(config, saved, folder).inflow, saved.inflow)
+    except RunFolderError:
+        return False
 
 
 def _stranger(case: Case) -> str:
@@ -147,16 +164,21 @@ def check_class(case: Case, info: dict[str, Any], path: Path) -> None:
         )
 
 
-def check_inflow(simulation: Simulation, then: Prescription | None, path: Path) -> None:
-    """Refuse to go on without the function that a run's inflow was prescribed by.
+def restored(config: Config, saved: Checkpoint, folder: RunFolder) -> Simulation:
+    """Return the simulation of a case that goes on from a checkpoint.
 
     Raises
     ------
     RunFolderError
-        If the simulation has none.
+        If the checkpoint does not fit, or a function prescribed the inflow and the case does not tell of any.
     """
-    if then and not simulation.inflow:
+    try:
+        simulation = config.case.restored(saved.state, config.run.threads)
+    except ConfigError as error:
+        raise RunFolderError(f"{folder.path}: its checkpoint does not fit its case: {error}") from None
+    if saved.inflow and not simulation.inflow:
         raise RunFolderError(
-            f"{path}: a function prescribes the inflow of the run, and its case does not tell of any; make it the "
-            "method `inflow` of the case's class, and put that into alsph.cases.CASES before"
+            f"{folder.path}: a function prescribes the inflow of the run, and its case does not tell of any; make it "
+            "the method `inflow` of the case's class, and put that into alsph.cases.CASES before"
         )
+    return simulation

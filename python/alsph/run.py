@@ -97,7 +97,7 @@ def complete(config: Config, path: Path, control: Control | None = None) -> Run:
         # Retries shorten the time step: the run is still that of the case that it began with.
         began = info.get("began", {}) if info.get("retries") else kept.case_tables()
         alike = (began, kept.until) == (config.case_tables(), config.until)
-        if alike and beginning.alike(config, kept, info) and _same_inflow(config, folder, info):
+        if alike and beginning.alike(config, kept, folder, info):
             if info.get("status") == "finished":
                 return Run(path)
             try:
@@ -166,7 +166,7 @@ def _resume(folder: RunFolder, until: float | None, threads: int | None, control
             remarks.append("its checkpoint, of an older alsph, does not tell its settings: those in case.toml are used")
         elif changed := _changes(config, saved, folder):
             remarks.append(f"goes on with other settings than before: {', '.join(changed)}")
-        simulation = _restored(config, saved, folder)
+        simulation = beginning.restored(config, saved, folder)
         if change := difference(simulation.inflow, saved.inflow):
             remarks.append(f"goes on with {change}")
         remarks += beginning.changed(config, info)
@@ -211,26 +211,6 @@ def _changes(now: Config, saved: Checkpoint, folder: RunFolder) -> list[str]:
         )
     names = [name for name in then | tables if then.get(name) != tables.get(name) and name not in now.case.made_for]
     return [f"{name} = {tables.get(name)} (was {then.get(name)})" for name in names]
-
-
-def _restored(config: Config, saved: Checkpoint, folder: RunFolder) -> Simulation:
-    try:
-        simulation = config.case.restored(saved.state, config.run.threads)
-    except ConfigError as error:
-        raise RunFolderError(f"{folder.path}: its checkpoint does not fit its case: {error}") from None
-    beginning.check_inflow(simulation, saved.inflow, folder.path)
-    return simulation
-
-
-def _same_inflow(config: Config, folder: RunFolder, info: dict[str, Any]) -> bool:
-    """Whether a run's inflow, where it is prescribed by a function, is still that of the case."""
-    if not (config.case.has_inflow or info.get("inflow_function")):
-        return True
-    try:
-        saved = folder.read_checkpoint()
-        return not difference(_restored(config, saved, folder).inflow, saved.inflow)
-    except RunFolderError:
-        return False
 
 
 class _Driver:
@@ -396,7 +376,7 @@ class _Driver:
         taken = min(case.time_step, self.time_step / case.particle_spacing)
         shorter = case.replace(time_step=RETRY_FACTOR * taken, time_step_safety=RETRY_FACTOR * case.time_step_safety)
         config, broke_down = Config(shorter, self.config.run), self.where
-        self._go_on_with(config, _restored(config, saved, self.folder))
+        self._go_on_with(config, beginning.restored(config, saved, self.folder))
         self.rewound = True
         self.folder.truncate(self.simulation.step, self.simulation.time)
         self.retries = [retry for retry in self.retries if retry["step"] <= self.simulation.step]
