@@ -81,7 +81,7 @@ def from_tables(tables: dict[str, Any], *folders: Path) -> Config:
     tables
         The tables.
     *folders
-        Folders that the path of an outline in them may start from; the present one if none is given.
+        Folders that the path of an outline or an initial run in them may start from; the present one if none is given.
 
     Raises
     ------
@@ -96,13 +96,20 @@ def from_tables(tables: dict[str, Any], *folders: Path) -> Config:
         raise ConfigError(f"run = {run!r}: must be a table, [run]")
     shape = parameters.get("shape")
     if isinstance(shape, str) and shape not in cases.body.SHAPES:
-        paths = [folder / shape for folder in folders or (Path(),)]
-        parameters["shape"] = str(next((path for path in paths if os.path.exists(path)), paths[0]))
+        parameters["shape"] = _found(shape, folders)
+    if isinstance(initial_run := run.get("initial_run"), str):
+        run = run | {"initial_run": _found(initial_run, (*folders, Path()))}
     case = cases.find(name)(**parameters)
     try:
         return Config(case, RunSettings(**run))
     except ConfigError as error:
         raise ConfigError(f"run.{error}") from None
+
+
+def _found(path: str, folders: tuple[Path, ...]) -> str:
+    """Return a path in the first of some folders that has it; in the first one if none has."""
+    paths = [folder / path for folder in folders or (Path(),)]
+    return str(next((path for path in paths if os.path.exists(path)), paths[0]))
 
 
 def load(path: str | Path, *folders: Path) -> Config:
@@ -113,7 +120,7 @@ def load(path: str | Path, *folders: Path) -> Config:
     path
         The file.
     *folders
-        Folders that the path of an outline in it may start from; its own if none is given.
+        Folders that the path of an outline or an initial run in it may start from; its own if none is given.
 
     Raises
     ------
