@@ -160,7 +160,7 @@ def walls(region: Polygon, spacing: float, layers: int) -> Solid:
     """Place solid particles on the lattice of :func:`cells` around a region of fluid, up to `layers` spacings deep."""
     points = cells(region, spacing, layers)
     distance = shapely.distance(region, shapely.points(points))
-    return _facing(points[(distance > 0) & (distance < layers * spacing)], region, spacing)
+    return facing(points[(distance > 0) & (distance < layers * spacing)], region, spacing)
 
 
 ROOM = 0.75
@@ -183,10 +183,10 @@ def body_layers(shape: Polygon, spacing: float, layers: int) -> Solid:
         candidates, room = candidates[room > ROOM * spacing], room[room > ROOM * spacing]
         if len(candidates):
             position = np.concatenate([position, candidates[[room.argmax()]]])
-    return _facing(position, shape, spacing)
+    return facing(position, shape, spacing)
 
 
-def _facing(position: FloatArray, shape: Polygon, spacing: float) -> Solid:
+def facing(position: FloatArray, shape: Polygon, spacing: float) -> Solid:
     """Solid particles at `position` with their depths below the boundary of `shape`, and the normals there.
 
     The normal is the gradient of the depth. On the bisector of a corner, where two boundary points are nearest, it is

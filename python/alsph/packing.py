@@ -7,6 +7,7 @@ from scipy.spatial import KDTree
 from shapely import MultiPolygon, Polygon
 
 from alsph.geometry import FloatArray, inside
+from alsph.thin import is_symmetric
 
 BAND = 4.0
 """Particles as far from the body as this [Δx] are moved."""
@@ -23,13 +24,12 @@ EVEN = 1e-6
 """Displacement [Δx] below which particles count as evenly spaced: on a lattice that fits the body they stay."""
 
 
-def pack(
-    lattice: FloatArray, body: Polygon | MultiPolygon, solid: FloatArray, spacing: float, *, symmetric: bool
-) -> FloatArray:
+def pack(lattice: FloatArray, body: Polygon | MultiPolygon, solid: FloatArray, spacing: float) -> FloatArray:
     """Return fluid particles (m, 2) around a body, their number times Δx² being the area that it leaves.
 
     Those next to the body are taken from where they are most crowded until the number is right, and then repel each
-    other until they are evenly spaced.
+    other until they are evenly spaced. Around a body that is its own mirror image about y = 0 they are so, too; their
+    number may then be one off.
 
     Parameters
     ----------
@@ -41,25 +41,24 @@ def pack(
         Its solid particles (k, 2).
     spacing
         Particle spacing Δx.
-    symmetric
-        Whether the flow is to be its own mirror image about y = 0; the number may then be one off.
     """
+    symmetric = is_symmetric(body)
     count = round(len(lattice) - body.area / spacing**2)
     height = _height(body, lattice)
     far, near = lattice[height > BAND * spacing], lattice[(height <= BAND * spacing) & (height > -spacing)]
     fixed = np.concatenate([_around(far, body, 3 * BAND * spacing), solid])
     near = _thinned(near, fixed, count - len(far), spacing, symmetric)
-    return np.concatenate([far, _spread(near, fixed, body, spacing, symmetric)])
+    return np.asarray(np.concatenate([far, _spread(near, fixed, body, spacing, symmetric)]))
 
 
 def _height(body: Polygon | MultiPolygon, points: FloatArray) -> FloatArray:
     """Return how far points (n, 2) lie outside the body, negative inside it."""
     distance = shapely.distance(body.boundary, shapely.points(points))
-    return np.where(inside(body, points), -distance, distance)
+    return np.asarray(np.where(inside(body, points), -distance, distance))
 
 
 def _around(points: FloatArray, body: Polygon | MultiPolygon, reach: float) -> FloatArray:
-    return points[_height(body, points) < reach]
+    return np.asarray(points[_height(body, points) < reach])
 
 
 def _mirror(points: FloatArray) -> NDArray[np.intp]:

@@ -4,7 +4,7 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiPolygon, Point, Polygon, affinity
 
-from alsph.geometry import FloatArray, Solid
+from alsph.geometry import FloatArray, Solid, body_layers, facing
 
 THINNEST = 2.0
 """Least thickness of a body [Δx]: a layer of solid particles for each face."""
@@ -13,7 +13,10 @@ WIDE = np.radians(75)
 """Corners of a wider inner angle stay sharp."""
 
 OPPOSED = -0.85
-"""Largest product of the unit normals of two faces of a thin part; at its edges, where they turn away, it has but one."""
+"""Largest product of the unit normals of two faces of a thin part; its edges, where they turn away, have but one."""
+
+AXIS = 0.25
+"""Solid particles of a symmetric body that are nearer to its axis than this [Δx] are put on it."""
 
 CONE = np.radians(45)
 """The opposite face is looked for this far off the normal."""
@@ -25,7 +28,7 @@ def carried(shape: Polygon | MultiPolygon, spacing: float) -> Polygon | MultiPol
     It is the shape opened by a disc (all the discs of that diameter that fit in), but for the tips of its wide corners,
     which stay. It tends to the shape as Δx falls, and is empty where no disc fits in.
     """
-    radius = 0.5 * THINNEST * spacing * (1 - 1e-9)  # a plate of just that thickness is carried
+    radius = 0.5 * THINNEST * spacing * (1 - 1e-3)  # a plate of just that thickness is carried
     core = shape.buffer(-radius)
     if core.is_empty:
         return core
@@ -50,6 +53,43 @@ def _wide_corners(shape: Polygon | MultiPolygon) -> FloatArray:
         turn = np.arctan2(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1))
         corners.append(points[(turn > np.radians(30)) & (turn < np.pi - WIDE)])
     return np.concatenate(corners)
+
+
+def thickness(shape: Polygon) -> float:
+    """Return the diameter of the largest disc in a shape."""
+    return float(2 * shapely.maximum_inscribed_circle(shape, tolerance=1e-3 * np.sqrt(shape.area)).length)
+
+
+def solid(shape: Polygon | MultiPolygon, spacing: float, layers: int) -> Solid:
+    """Place particles along the surface of a carried body, up to `layers` deep, with two faces where it is thin.
+
+    Those of a body that is its own mirror image about y = 0 are so, too.
+    """
+    position = np.concatenate([body_layers(part, spacing, layers).position for part in shapely.get_parts(shape)])
+    if not is_symmetric(shape):
+        return with_both_faces(_with_normals(facing(position, shape, spacing), shape), shape, layers * spacing)
+    axis = np.abs(position[:, 1]) < AXIS * spacing
+    upper = position[(position[:, 1] > 0) & ~axis]
+    middle = np.sort(position[axis, 0])
+    middle = middle[np.diff(middle, prepend=-np.inf) > 2 * AXIS * spacing]  # of a pair about the axis, one
+    half = facing(np.concatenate([upper, np.stack([middle, 0 * middle], axis=1)]), shape, spacing)
+    half.normal[len(upper) :, 1] = 0
+    half = with_both_faces(_with_normals(half, shape), shape, layers * spacing)
+    flip, above = np.array([1.0, -1.0]), half.position[:, 1] > 0
+    return Solid(
+        np.concatenate([half.position, half.position[above] * flip]),
+        np.concatenate([half.normal, half.normal[above] * flip]),
+        np.concatenate([half.depth, half.depth[above]]),
+    )
+
+
+def _with_normals(solid: Solid, shape: Polygon | MultiPolygon) -> Solid:
+    """Give particles midway between parallel faces, which have no normal, that of one of the two."""
+    normal = solid.normal.copy()
+    for k in np.flatnonzero(np.hypot(*normal.T) < 0.5):
+        offset = _nearest(shape.boundary, solid.position[k]) - solid.position[k]
+        normal[k] = offset / np.hypot(*offset)
+    return Solid(solid.position, normal, solid.depth)
 
 
 def with_both_faces(solid: Solid, shape: Polygon | MultiPolygon, reach: float) -> Solid:
@@ -102,16 +142,3 @@ def is_symmetric(shape: Polygon | MultiPolygon) -> bool:
 
 def _mirror_image(shape: Polygon | MultiPolygon) -> Polygon | MultiPolygon:
     return affinity.scale(shape, 1, -1, origin=(0, 0))
-
-
-def mirrored(solid: Solid, spacing: float) -> Solid:
-    """Return the upper half of the particles of a symmetric body and its exact mirror image about y = 0."""
-    axis = np.abs(solid.position[:, 1]) < 0.05 * spacing
-    upper, middle = solid.where((solid.position[:, 1] > 0) & ~axis), solid.where(axis)
-    flip = np.array([1.0, -1.0])
-    level = np.column_stack([middle.normal[:, 0], np.zeros(len(middle.depth))])
-    return Solid(
-        np.concatenate([upper.position, upper.position * flip, middle.position * (1.0, 0.0)]),
-        np.concatenate([upper.normal, upper.normal * flip, level / np.hypot(*level.T)[:, None].clip(0.5)]),
-        np.concatenate([upper.depth, upper.depth, middle.depth]),
-    )

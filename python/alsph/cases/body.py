@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from functools import cached_property
@@ -9,14 +10,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 from shapely import affinity
 
 from alsph.cases.channel import Channel
-from alsph.geometry import FloatArray, Solid, body_layers, inside
+from alsph.geometry import FloatArray, Solid
 from alsph.measures import Measure
 from alsph.outline import Outline
+from alsph.packing import pack
+from alsph.thin import THINNEST, carried, solid, thickness
 
 if TYPE_CHECKING:
     from alsph.results import Run
@@ -27,8 +29,8 @@ class Body(Channel):
 
     D is the side of the square, the chord of the airfoil, or the unit of the file's lengths. A file holds points, two
     numbers a line, in any of the usual orders and forms; several closed curves are several bodies. The centroid, that
-    of all of them together, lies at (upstream, 0). The solid particles follow the surface; parts thinner than about
-    2Δx are badly resolved.
+    of all of them together, lies at (upstream, 0). The solid particles follow the surface. What is thinner than 2 Δx,
+    such as a sharp trailing edge, is cut off (:attr:`carried`); a body of which that leaves nothing is refused.
     """
 
     name: ClassVar[str] = "body"
@@ -70,6 +72,18 @@ class Body(Channel):
             )
         return self
 
+    @model_validator(mode="after")
+    def _is_carried(self) -> Self:
+        for name, outline, left in zip(self.coefficient_bodies, self.outlines, self.carried, strict=True):
+            if left.is_empty:
+                thickest = thickness(outline)
+                raise ValueError(
+                    f"resolution = {self.resolution}: the {name} is at most {thickest:.3g} D, or "
+                    f"{thickest * self.resolution:.3g} Δx, thick and would not keep the flow apart; it takes "
+                    f"{THINNEST:g} Δx, a resolution of {math.ceil(THINNEST / thickest)} or more"
+                )
+        return self
+
     @cached_property
     def outline(self) -> shapely.Polygon | shapely.MultiPolygon:
         """The body, or all bodies together, their centroid at the origin, turned by the angle of attack."""
@@ -83,19 +97,30 @@ class Body(Channel):
         """The single bodies of :attr:`outline`."""
         return list(shapely.get_parts(self.outline))
 
+    @cached_property
+    def carried(self) -> list[shapely.Polygon | shapely.MultiPolygon]:
+        """The single bodies without what is too thin for the resolution."""
+        return [carried(outline, self.particle_spacing) for outline in self.outlines]
+
     @property
     def coefficient_bodies(self) -> list[str]:
         """``body``, or ``body_1``, ``body_2``, ... where there are several."""
         count = len(self.outlines)
         return ["body"] if count == 1 else [f"body_{number}" for number in range(1, count + 1)]
 
-    def solids(self) -> list[Solid]:
-        """Return layers along the surface of each body."""
-        return [body_layers(outline, self.particle_spacing, self.support_layers) for outline in self.outlines]
+    @cached_property
+    def _solids(self) -> list[Solid]:
+        return [solid(outline, self.particle_spacing, self.support_layers) for outline in self.carried]
 
-    def outside(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Return which points lie outside the outline."""
-        return ~inside(self.outline, points)
+    def solids(self) -> list[Solid]:
+        """Return layers along the surface of each body, with two faces where it is thin."""
+        return self._solids
+
+    def fluid(self, cells: FloatArray) -> FloatArray:
+        """Return fluid evenly spaced around the bodies, as much as they leave of the cells."""
+        position = np.concatenate([solid.position for solid in self._solids])
+        bodies = shapely.union_all(self.carried)
+        return np.asarray(self.centre + pack(cells - self.centre, bodies, position, self.particle_spacing))
 
     def measures(self, run: Run) -> list[Measure]:
         """Return the forces, the mean lift among them, which a body at an angle has, and the Strouhal number."""

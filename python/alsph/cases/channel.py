@@ -74,8 +74,8 @@ class Channel(Case):
         """Return the solid particles of each body, relative to the centre."""
 
     @abstractmethod
-    def outside(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Return which points (n, 2), relative to the centre, lie outside the bodies."""
+    def fluid(self, cells: FloatArray) -> FloatArray:
+        """Return the positions (m, 2) of the fluid, given the cell centres (n, 2) of the whole channel."""
 
     @property
     def default_until(self) -> float:
@@ -110,7 +110,7 @@ class Channel(Case):
         rows = symmetric_centres(self.whole_cells("height", self.height), spacing)
         buffer = cell_centres(self.buffer_columns, spacing)
         channel = lattice(cell_centres(self.whole_cells("length", self.length), spacing), rows)
-        fluid = channel[self.outside(channel - self.centre)]
+        fluid = self.fluid(channel)
         return join(
             particles(Kind.FLUID, fluid, self._initial_velocity(fluid)),
             particles(Kind.INLET, lattice(-buffer, rows), [1.0, 0.0]),

@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from alsph import reference
 from alsph.cases.channel import Channel
@@ -40,9 +39,9 @@ class Cylinder(Channel):
         """Return concentric rings."""
         return [cylinder_rings(RADIUS, self.particle_spacing, self.support_layers)]
 
-    def outside(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Return which points are at least a radius from the centre."""
-        return np.asarray(np.hypot(*points.T) >= RADIUS)
+    def fluid(self, cells: FloatArray) -> FloatArray:
+        """Return the cells whose centres are at least a radius from that of the cylinder."""
+        return np.asarray(cells[np.hypot(*(cells - self.centre).T) >= RADIUS])
 
     def surface_points(self) -> tuple[FloatArray, FloatArray]:
         """Return 72 points on the cylinder, every 5 degrees from the front stagnation point over the upper side."""

@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+import shapely
+from alsph import thin
+from alsph.cases import Body
+from alsph.errors import ConfigError
+from alsph.geometry import Kind
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import KDTree
+
+CHANNEL = {"length": 5.0, "height": 4.0, "upstream": 2.0}
+
+
+def plate(tmp_path, thickness):
+    path = tmp_path / "plate.txt"
+    path.write_text(f"0 -0.5\n{thickness} -0.5\n{thickness} 0.5\n0 0.5\n")
+    return path
+
+
+@given(st.integers(1, 200), st.floats(0.01, 0.2))
+@settings(max_examples=30, deadline=None)
+def test_what_a_resolution_carries_is_part_of_the_body_and_keeps_wide_corners(turn, thickness):
+    box = shapely.affinity.rotate(shapely.box(-0.5, -thickness / 2, 0.5, thickness / 2), turn)
+    carried = thin.carried(box, thickness / 2.5)
+    assert carried.symmetric_difference(box).area < 1e-3 * box.area
+    assert thin.carried(box, thickness / 1.9).is_empty
+
+
+def test_what_is_carried_of_an_airfoil_tends_to_it():
+    outline = Body(shape="naca0012", **CHANNEL).outline
+    carried = [thin.carried(outline, 1 / resolution) for resolution in (20, 40, 80, 160, 320)]
+    lost = [1 - shape.area / outline.area for shape in carried]
+    chord = [shape.bounds[2] - shape.bounds[0] for shape in carried]
+    assert (np.diff(lost) < 0).all() and lost[-1] < 2e-3
+    assert (np.diff(chord) > 0).all() and chord[-1] > 0.97
+    assert all(outline.buffer(1e-9).contains(shape) for shape in carried)
+
+
+@pytest.mark.parametrize("thickness", [0.001, 0.01, 0.04, 0.15])
+def test_a_body_too_thin_for_the_resolution_is_refused(tmp_path, thickness):
+    path = plate(tmp_path, thickness)
+    with pytest.raises(ConfigError, match=f"{thickness:g} D, or .* Δx, thick.*resolution of") as refusal:
+        Body(shape=path, resolution=10, **CHANNEL)
+    enough = int(str(refusal.value).split("resolution of ")[1].split()[0])
+    if enough < 1000:
+        assert Body(shape=path, resolution=enough, **CHANNEL).carried[0].area == pytest.approx(thickness, rel=0.01)
+
+
+@pytest.mark.parametrize("thickness", [0.2, 0.25, 0.3, 0.4])
+def test_a_thin_plate_is_filled_and_has_two_faces(tmp_path, thickness):
+    (solid,) = Body(shape=plate(tmp_path, thickness), resolution=10, **CHANNEL).solids()
+    places, count = np.unique(solid.position.round(12), axis=0, return_counts=True)
+    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 101) * thickness, np.linspace(-0.45, 0.45, 91))
+    assert KDTree(places).query(np.stack([x.ravel(), y.ravel()], axis=1))[0].max() < 0.09
+    assert set(count) == {1, 2}
+    middle = np.abs(solid.position[:, 1]) < 0.3
+    right = solid.normal[:, 0] > 0
+    assert (np.abs(solid.normal[middle, 0]) > 0.99).all()
+    assert np.count_nonzero(middle & right) == np.count_nonzero(middle & ~right)
+    depth = np.where(right, 0.5 * thickness - solid.position[:, 0], 0.5 * thickness + solid.position[:, 0])
+    assert solid.depth[middle] == pytest.approx(depth[middle], abs=1e-6)
+
+
+@pytest.mark.parametrize("resolution", range(8, 14))
+@pytest.mark.parametrize("shape", ["square_cylinder", "plate"])
+def test_fluid_fills_what_the_body_leaves(tmp_path, shape, resolution):
+    case = Body(shape=plate(tmp_path, 0.4) if shape == "plate" else shape, resolution=resolution, **CHANNEL)
+    state = case.particles()
+    fluid = state["position"][state["kind"] == Kind.FLUID] - case.centre
+    assert len(fluid) == pytest.approx((20 - case.outline.area) * resolution**2, abs=1)
+    assert shapely.distance(case.outline, shapely.points(fluid)).min() > 0.35 / resolution
+    assert KDTree(fluid).query(fluid, 2)[0][:, 1].min() > 0.75 / resolution
+    assert KDTree(fluid).query(fluid * (1, -1))[0].max() < 1e-12
+
+
+@pytest.mark.parametrize("resolution", [9, 11])
+def test_symmetric_flow_past_a_square_between_lattice_lines_has_no_lift(resolution):
+    case = Body(resolution=resolution, reynolds=100, perturbation=0, **CHANNEL)
+    simulation = case.simulation(threads=1)
+    simulation.advance(60)
+    assert np.abs(simulation.history()["lift_coefficient"]).max() < 1e-6
