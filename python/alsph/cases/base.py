@@ -200,7 +200,12 @@ class Case(Parameters):
         ConfigError
             If the particles would not fit into the memory that is free.
         """
-        needed, free = self.memory(), _free_memory()
+        try:
+            needed, free = self.memory(), _free_memory()
+        except OverflowError:
+            raise ConfigError(
+                f"{self.name}: more particles than can be counted; lower the resolution or the size"
+            ) from None
         if needed > free:
             raise ConfigError(
                 f"resolution = {self.resolution}: about {self.particle_estimate():,} particles need "
