@@ -27,6 +27,7 @@ from alsph.durable import flush, growing, replacing
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.geometry import FloatArray
 from alsph.reading import DAMAGE, sound
+from alsph.text import printable
 
 try:
     import fcntl
@@ -165,7 +166,7 @@ class RunFolder:
     def log(self, line: str) -> None:
         """Append a line to ``run.log``."""
         with self._writing(), self._file("run.log").open("a", encoding="utf-8") as file:
-            file.write(f"{clock.strftime('%Y-%m-%d %H:%M:%S')}  {line}\n")
+            file.write(f"{clock.strftime('%Y-%m-%d %H:%M:%S')}  {printable(line)}\n")
 
     def append_history(self, rows: dict[str, NDArray[Any]], bodies: list[str]) -> None:
         """Append rows of :meth:`alsph.Simulation.new_history` to ``history.csv``."""

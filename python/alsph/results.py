@@ -20,6 +20,7 @@ from alsph.ledger import Ledger
 from alsph.measures import Measure, Profile
 from alsph.progress import duration
 from alsph.reading import Snapshot
+from alsph.text import in_figure, printable
 
 
 @dataclass(frozen=True)
@@ -314,7 +315,7 @@ class Run:
 
     def plot_spectrum(self, path: str | Path | None = None, body: str | None = None) -> Figure:
         """Figure of the spectra of drag and lift in the averaging window; saved if `path` is given."""
-        return _saved(plotting.spectrum({self.path.name: self}, body), path)
+        return _saved(plotting.spectrum({in_figure(self.path.name): self}, body), path)
 
     def plot_field(
         self,
@@ -361,10 +362,10 @@ class Run:
         """Name the folder, the case, the status and the time reached."""
         time = self.history["time"]
         reached = time[-1] if len(time) else 0.0
-        return f"Run('{self.path}': {self.case.get('case', 'unknown')}, {self.status}, tU/D = {reached:.4g})"
+        return printable(f"Run('{self.path}': {self.case.get('case', 'unknown')}, {self.status}, tU/D = {reached:.4g})")
 
     def _repr_html_(self) -> str:
-        rows = ((html.escape(name), html.escape(str(value))) for name, value in self.summary().items())
+        rows = ((html.escape(name), html.escape(printable(str(value)))) for name, value in self.summary().items())
         return "<table>" + "".join(f"<tr><th>{name}</th><td>{value}</td></tr>" for name, value in rows) + "</table>"
 
 

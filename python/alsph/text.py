@@ -47,6 +47,11 @@ def printable(text: str, *, lines: bool = False) -> str:
     )
 
 
+def in_figure(text: str) -> str:
+    """Return a text as a label of a figure, where a dollar sign begins no formula."""
+    return printable(text).replace("$", r"\$")
+
+
 def shown(value: Any) -> str:
     """Return a value as it would be typed, for messages: printable, and cut where it is very long."""
     try:

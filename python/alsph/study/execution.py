@@ -136,6 +136,7 @@ class _LocalPool:
             input=json.dumps(tables),
             capture_output=True,
             text=True,
+            errors="replace",
             start_new_session=True,
         )
         if done.returncode:

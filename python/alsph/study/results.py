@@ -20,6 +20,7 @@ from alsph.results import Run
 from alsph.study.declaration import Figure, Point, Study, text
 from alsph.study.state import ENDED, RUNS, State, states
 from alsph.tables import markdown
+from alsph.text import in_figure, printable
 
 DIVERGENCE = "mean velocity divergence, |∇·u| D/U"
 
@@ -126,7 +127,7 @@ class Results:
         ]
         parts += [f"*{warning}*" for warning in self.warnings]
         parts += [f"![{titles[name]}]({name}.png)\n\n*{titles[name]}*" for name in figures or []]
-        return "\n\n".join(part for part in parts if part) + "\n"
+        return printable("\n\n".join(part for part in parts if part) + "\n", lines=True)
 
     def _table(self) -> str:
         columns = [name for name in self._columns() if name not in ("folder", "seconds")]
@@ -162,9 +163,11 @@ class Results:
 
     def _repr_html_(self) -> str:
         columns = [name for name in self._columns() if name != "folder"]
-        head = "".join(f"<th>{html.escape(name)}</th>" for name in columns)
+        head = "".join(f"<th>{html.escape(printable(name))}</th>" for name in columns)
         body = "".join(
-            "<tr>" + "".join(f"<td>{html.escape(_shown(row.get(name, '')))}</td>" for name in columns) + "</tr>"
+            "<tr>"
+            + "".join(f"<td>{html.escape(printable(_shown(row.get(name, ''))))}</td>" for name in columns)
+            + "</tr>"
             for row in self.rows
         )
         return f"<table><tr>{head}</tr>{body}</table>"
@@ -191,7 +194,7 @@ class Results:
         parts = []
         for name in self.study.swept:
             if name != without and name in row and name in self.study.varied:
-                parts.append(_LEGEND.get(name, "{name} {value}").format(name=name, value=text(row[name])))
+                parts.append(_LEGEND.get(name, "{name} {value}").format(name=name, value=in_figure(text(row[name]))))
         return " ".join(parts)
 
     def _curves(self, figure: Figure) -> Picture | None:
@@ -297,7 +300,7 @@ def _is_nan(value: Any) -> bool:
 
 
 def _cell(value: Any) -> str:
-    return repr(float(value)) if isinstance(value, float) else str(value)
+    return repr(float(value)) if isinstance(value, float) else printable(str(value))
 
 
 def _shown(value: Any) -> str:

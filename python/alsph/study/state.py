@@ -8,6 +8,7 @@ from pathlib import Path
 from alsph.errors import RunFolderError
 from alsph.io import RunFolder
 from alsph.study.declaration import Point
+from alsph.text import printable
 
 ENDED = ("finished", "diverged", "skipped")
 RUNS = "runs"
@@ -60,7 +61,7 @@ def state(path: Path) -> State:
         status, time = "running", max(time, _last_time(path / "history.csv"))
     elif status in ("running", "interrupted"):
         status = "stopped"
-    return State(status, time, float(info.get("seconds", 0.0)), str(info.get("message", "")))
+    return State(printable(status), time, float(info.get("seconds", 0.0)), printable(str(info.get("message", ""))))
 
 
 def _last_time(path: Path) -> float:
