@@ -75,9 +75,13 @@ class Config:
         values = {name: getattr(self.case, name) for name in self.case.parameter_names()}
         return {"case": self.case.name} | {name: value for name, value in values.items() if value is not None}
 
+    def text(self) -> str:
+        """Return the configuration with all its parameters as TOML."""
+        return tomli_w.dumps(self.tables())
+
     def save(self, path: Path) -> None:
         """Write the configuration with all its parameters to a TOML file."""
-        path.write_text(tomli_w.dumps(self.tables()), encoding="utf-8")
+        path.write_bytes(self.text().encode())
 
 
 def from_tables(tables: dict[str, Any]) -> Config:

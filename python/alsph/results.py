@@ -1,6 +1,7 @@
 """What a run folder tells: forces, Strouhal number, pressure coefficient, divergence, snapshots and figures."""
 
 import html
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -102,10 +103,27 @@ class Run:
             raise RunFolderError(f"{self.path}: no such run folder")
         self.case: dict[str, Any] = reading.case(self.path / "case.toml")
         self.info: dict[str, Any] = reading.info(self.path / "run.json")
+        if self._goes_on() and RunFolder(self.path).is_busy() is False:
+            self.info = reading.info(self.path / "run.json")  # it may just have ended
+            if self._goes_on():
+                self.info |= {"status": "stopped", "message": self._how_to_go_on()}
+
+    def _goes_on(self) -> bool:
+        return self.info.get("status") in ("starting", "running")
+
+    def _how_to_go_on(self) -> str:
+        """Return what to say of a run that has neither ended nor a process at work in it."""
+        resumable = RunFolder(self.path).has_checkpoint()
+        command = f"alsph resume {shlex.quote(str(self.path))}" if resumable else "alsph run, with --force"
+        return f"no process is at work in it, it was killed or its machine went down; go on with: {command}"
 
     @property
     def status(self) -> str:
-        """``running``, ``finished``, ``interrupted``, ``diverged`` or ``failed``."""
+        """How far the run is.
+
+        ``running`` (``starting`` before its first step), ``finished``, ``interrupted``, ``diverged``, ``failed``, or
+        ``stopped``: killed, with no process at work in it.
+        """
         return str(self.info.get("status", "unknown"))
 
     @property
