@@ -7,10 +7,12 @@ import signal
 import subprocess
 import time as clock
 
+import h5py
+import numpy as np
 import pytest
-from alsph import Run, reading
+from alsph import Run, checkpoint, reading
 from alsph.config import Config, RunSettings
-from alsph.errors import RunFolderError
+from alsph.errors import ConfigError, RunFolderError
 from alsph.io import RunFolder
 from alsph.run import Control, complete, resume
 from alsph.study.state import state
@@ -20,7 +22,7 @@ from processes import MAIN, command, wait_until_stepping, write_case
 @pytest.fixture
 def path(tmp_path, small):
     """The folder of a short run."""
-    return small.run(tmp_path / "run", until=0.05, progress=False).path
+    return small.run(tmp_path / "run", until=0.05, surface_interval=0.01, progress=False).path
 
 
 def content(folder):
@@ -162,3 +164,68 @@ def test_a_path_may_hold_any_bytes(tmp_path, small_options):
         done = subprocess.run([*MAIN, *line], capture_output=True, timeout=60)
         assert done.returncode == 0 and rb"caf\udce9" in done.stdout and not done.stderr, done.stderr
     assert reading.info(Run(os.fsdecode(path)).path / "run.json")["status"] == "finished"
+
+
+@pytest.mark.parametrize("link", ["figures", "figures/forces.png", "figures/vorticity.png", "figures/ledger.png"])
+def test_no_figure_is_drawn_through_a_link(path, alsph, tmp_path, link):
+    elsewhere = tmp_path / "elsewhere"
+    (path / link).parent.mkdir(exist_ok=True)
+    if link == "figures":
+        elsewhere.mkdir()
+    else:
+        elsewhere.write_text("precious")
+    (path / link).symlink_to(elsewhere)
+    code, _, complaints = alsph("plot", path)
+    assert code == 2 and f"{path / link}: a link" in complaints
+    assert not list(elsewhere.iterdir()) if link == "figures" else elsewhere.read_text() == "precious"
+    if link != "figures":
+        with pytest.raises(RunFolderError, match="a link or a special file"):
+            Run(path).plot_forces(path / link)
+        (path / link).unlink()
+        os.link(elsewhere, path / link)  # which is replaced, not written through
+        assert alsph("plot", path)[0] == 0 and elsewhere.read_text() == "precious"
+
+
+def test_figures_of_no_known_format_are_refused(path, tmp_path):
+    with pytest.raises(ConfigError, match="'pgn' is no format of figures; did you mean 'png'?"):
+        Run(path).plot_forces(tmp_path / "forces.pgn")
+    Run(path).plot_forces(tmp_path / "forces")
+    assert (tmp_path / "forces.png").stat().st_size > 1000
+
+
+def test_the_time_of_a_picture_is_said(path, alsph):
+    code, _, complaints = alsph("plot", path, "--field", "pressure", "--time", 99)
+    time = Run(path).times[-1]
+    assert code == 0 and complaints == f"fields at t* = {time:.6g}, the output nearest to 99\n"
+
+
+def test_a_file_that_expands_without_end_is_refused(path, alsph):
+    with h5py.File(path / "surface.h5", "w") as file:
+        file["angle"] = np.arange(72.0)
+        file.create_dataset("time", (2**22,), "f8", chunks=(2**20,), compression="gzip", fillvalue=0)[:] = 0
+        samples = file.create_dataset("pressure_coefficient", (2**22, 72), "f8", chunks=(2**14, 72), compression="gzip")
+        samples[: 2**14] = 0
+    code, _, complaints = alsph("plot", path)
+    assert code == 2 and "surface.h5: unreadable" in complaints and "more than its" in complaints
+
+
+@pytest.mark.parametrize("name", ["history.csv", "surface.h5", "checkpoint.h5", "particles.vtkhdf"])
+def test_what_does_not_fit_into_memory_is_told_in_a_line(path, monkeypatch, name):
+    monkeypatch.setattr(reading, "free_memory", lambda: 100.0)
+    readers = {
+        "history.csv": reading.history,
+        "surface.h5": reading.surface,
+        "checkpoint.h5": checkpoint.read,
+        "particles.vtkhdf": lambda file: reading.snapshot(file, 0),
+    }
+    with pytest.raises(RunFolderError, match=f"{name}: .*(GiB of memory|larger than)"):
+        readers[name](path / name)
+    assert (path / name).exists()
+
+
+@pytest.mark.parametrize("name", ["case.toml", "run.json", "history.csv"])
+def test_a_run_folder_of_devices_has_an_end(path, name):
+    (path / name).unlink()
+    (path / name).symlink_to("/dev/zero")
+    with pytest.raises(RunFolderError, match=f"{name}: unreadable.*no regular file"):
+        Run(path).history  # noqa: B018

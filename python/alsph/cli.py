@@ -19,6 +19,7 @@ from alsph.autotune import autotune
 from alsph.config import Config, RunSettings
 from alsph.convergence import converge
 from alsph.describe import describe
+from alsph.durable import check_folder
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters, describe_default
 from alsph.progress import seconds_of
@@ -317,7 +318,8 @@ def _plot(
         plotting.field_style(name)
     figures = output or path / "figures"
     drawings: dict[str, Callable[[Path], object]] = {
-        profile.file_name: plotting.profile({"computed": profile}).savefig for profile in run.profiles
+        profile.file_name: functools.partial(plotting.save, plotting.profile({"computed": profile}))
+        for profile in run.profiles
     }
     drawings["ledger"] = run.plot_ledger
     if run.body:
@@ -325,7 +327,11 @@ def _plot(
     if run.config.case.surface_points():
         drawings["pressure_coefficient"] = run.plot_pressure_coefficient
     drawings |= {name: functools.partial(run.plot_field, name, time) for name in field}
+    if not output:
+        check_folder(figures)
     figures.mkdir(parents=True, exist_ok=True)
+    if time is not None and field:
+        complain(f"fields at t* = {run.snapshot(time).time:.6g}, the output nearest to {time:g}")
     for name, draw in drawings.items():
         draw(figures / f"{name}.png")
         say(figures / f"{name}.png")

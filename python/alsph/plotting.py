@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from matplotlib.figure import Figure
 from scipy.ndimage import binary_fill_holes
 
 from alsph import analysis, sampling
+from alsph.durable import check_target, replacing
 from alsph.errors import ConfigError
 from alsph.geometry import FloatArray, Kind
 from alsph.parameters import suggest
@@ -43,6 +45,34 @@ FIELDS = {
     "velocity": FieldStyle(r"velocity $|\mathbf{u}|/U$", "viridis", False),
     "velocity_divergence": FieldStyle(r"velocity divergence $\nabla\cdot\mathbf{u}\,D/U$", "PuOr_r", True),
 }
+
+
+def save(figure: Figure, path: str | Path, **options: Any) -> None:
+    """Save a figure in a file; what was there is replaced, and nothing is written through a link.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : path
+        The file, whose suffix says the format: PNG if there is none.
+    **options
+        Of matplotlib's ``savefig``.
+
+    Raises
+    ------
+    ConfigError
+        If the format is unknown.
+    RunFolderError
+        If the file is a link or a special file.
+    """
+    path = Path(path)
+    path = path if path.suffix else path.with_suffix(".png")
+    known = figure.canvas.get_supported_filetypes()
+    if (kind := path.suffix[1:].lower()) not in known:
+        raise ConfigError(f"{path}: '{kind}' is no format of figures; {suggest(kind, known)}")
+    check_target(path)
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format=kind, **options)
 
 
 def field_style(name: str) -> FieldStyle:

@@ -389,5 +389,5 @@ class Run:
 
 def _saved(figure: Figure, path: str | Path | None) -> Figure:
     if path is not None:
-        figure.savefig(path)
+        plotting.save(figure, path)
     return figure

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import warnings
 from abc import abstractmethod
 from pathlib import Path
@@ -16,6 +15,7 @@ from pydantic import Field
 from alsph.errors import ConfigError
 from alsph.geometry import FloatArray, Kind, Problem
 from alsph.measures import Measure, Profile
+from alsph.memory import free_memory
 from alsph.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -201,7 +201,7 @@ class Case(Parameters):
             If the particles would not fit into the memory that is free.
         """
         try:
-            needed, free = self.memory(), _free_memory()
+            needed, free = self.memory(), free_memory()
         except OverflowError:
             raise ConfigError(
                 f"{self.name}: more particles than can be counted; lower the resolution or the size"
@@ -339,14 +339,3 @@ class Case(Parameters):
                 f"use {below:.6g} or {above:.6g}"
             )
         return round(cells)
-
-
-def _free_memory() -> float:
-    """Memory that can be had without swapping [bytes]; infinite where the system does not tell."""
-    try:
-        for line in Path("/proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                return float(line.split()[1]) * 1024
-        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (OSError, ValueError):
-        return math.inf

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure as Picture
 
 from alsph import plotting
 from alsph.analysis import Estimate
+from alsph.durable import check_target, replacing, write_text
 from alsph.errors import AlsphError
 from alsph.measures import Profile
 from alsph.parameters import suggest
@@ -95,8 +96,8 @@ class Results:
         self._save_csv(self.path / "results.csv")
         figures = self.draw()
         for name, figure in figures.items():
-            figure.savefig(self.path / f"{name}.png", dpi=120)
-        (self.path / "results.md").write_text(self.to_markdown([*figures]), encoding="utf-8")
+            plotting.save(figure, self.path / f"{name}.png", dpi=120)
+        write_text(self.path / "results.md", self.to_markdown([*figures]))
 
     def _columns(self) -> list[str]:
         return list(dict.fromkeys(name for row in self.rows for name in row))
@@ -105,7 +106,8 @@ class Results:
         columns = self._columns()
         uncertain = {name for row in self.rows for name, value in row.items() if _uncertainty(value) is not None}
         header = [cell for name in columns for cell in ([name, f"{name}, ±"] if name in uncertain else [name])]
-        with path.open("w", newline="", encoding="utf-8") as file:
+        check_target(path)
+        with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(header)
             for row in self.rows:
