@@ -379,6 +379,7 @@ def _study_run(
     """
     declared = study.load(name, preset)
     if dry_run:
+        study.check_names(declared, declared.points())
         _print_states(declared, output)
         return
     results = study.run(

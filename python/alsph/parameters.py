@@ -91,6 +91,19 @@ def describe_default(model: type[Parameters], name: str) -> str:
     return "automatic" if default is None else f"{default:.6g}" if isinstance(default, float) else str(default).lower()
 
 
+def choose(what: str, name: object, known: Iterable[str]) -> None:
+    """Refuse a name that is not known.
+
+    Raises
+    ------
+    ConfigError
+        With what is known, or the name that was probably meant.
+    """
+    known = list(known)
+    if name not in known:
+        raise ConfigError(f"{what} = {shown(name)}: unknown; {suggest(str(name), known)}")
+
+
 def suggest(name: str, known: Iterable[str]) -> str:
     """Return ``did you mean ...?`` for a misspelt name, or the list of what is known."""
     known = list(known)

@@ -16,12 +16,13 @@ from alsph.analysis import Estimate, Window
 from alsph.config import Config
 from alsph.errors import ConfigError, RunFolderError
 from alsph.geometry import FloatArray
-from alsph.io import RunFolder
+from alsph.io import AXES, RunFolder
 from alsph.ledger import Ledger
 from alsph.measures import Measure, Profile
+from alsph.parameters import choose
 from alsph.progress import duration
 from alsph.reading import Snapshot
-from alsph.text import in_figure, printable
+from alsph.text import in_figure, printable, shown
 
 
 @dataclass(frozen=True)
@@ -181,8 +182,19 @@ class Run:
         Returns
         -------
         ndarray, shape (steps,)
-            NaN if there is no such body.
+            NaN if the run has no body.
+
+        Raises
+        ------
+        ConfigError
+            If there is no such direction, part or body.
         """
+        axes = [name for name in AXES if name != "z" or self.config.case.space_dimensions == 3]
+        if axis not in axes:
+            raise ConfigError(f"axis = {shown(axis)}: unknown; known: {', '.join(axes)}; the drag is x and the lift y")
+        choose("part", part, ("total", "pressure", "viscous"))
+        if body is not None:
+            choose("body", body, self.bodies or [known["name"] for known in self.config.case.bodies()])
         name = body or next(iter(self.bodies), "")
         parts = ("pressure", "viscous") if part == "total" else (part,)
         columns = [self.history.get(f"{name}_{each}_force_{axis}") for each in parts]
@@ -253,12 +265,12 @@ class Run:
         Raises
         ------
         ConfigError
-            If the time is no number.
+            If the time is no finite number.
         RunFolderError
             If there is no complete snapshot.
         """
-        if time is not None and not np.isfinite(time):
-            raise ConfigError(f"time = {time}: must be a finite number")
+        if time is not None and not (isinstance(time, int | float | np.number) and np.isfinite(time)):
+            raise ConfigError(f"time = {shown(time)}: must be a finite number")
         if len(self.times) == 0:
             raise RunFolderError(f"{self.path}: no snapshot yet; wait for the first one or lower output_interval")
         index = len(self.times) - 1 if time is None else int(np.abs(self.times - time).argmin())
@@ -279,6 +291,11 @@ class Run:
         """
         times = self.times[(self.times >= self.window.start) & (self.times <= self.window.end)]
         box = np.array(lower, dtype=float), np.array(upper, dtype=float)
+        dimensions = self.config.case.space_dimensions
+        if not box[0].shape == box[1].shape == (dimensions,) or not np.all(box[0] < box[1]):
+            raise ConfigError(
+                f"box from {shown(lower)} to {shown(upper)}: needs corners of {dimensions} numbers, the lower one first"
+            )
         if len(times) < 2:
             return np.full(len(lower), np.nan)
         balances = [self._box_balance(self.snapshot(time), box) for time in times]
@@ -358,6 +375,7 @@ class Run:
         view : (left, right, bottom, top), optional
             Part of the plane to show [D]; all of it if None.
         """
+        plotting.field_style(name)
         return _saved(plotting.field(self.snapshot(time), name, self.spacing, limit=limit, view=view), path)
 
     def plot_pressure_coefficient(

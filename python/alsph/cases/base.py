@@ -41,6 +41,8 @@ class Case(Parameters):
     velocity_max: ClassVar[float] = 1.0
     """Expected largest velocity in U, for estimates of the time step."""
     coefficient_body: ClassVar[str | None] = None
+    later_names: ClassVar[tuple[str, ...]] = ()
+    """Measures and profiles, or beginnings of their names, that only a run with some results has."""
 
     reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, ge=8, description="particles per reference length, D/Δx [-]")

@@ -36,6 +36,10 @@ class Cylinder(Channel):
     title: ClassVar[str] = "flow past a circular cylinder in a channel"
     body_name: ClassVar[str] = "cylinder"
     coefficient_body: ClassVar[str | None] = "cylinder"
+    later_names: ClassVar[tuple[str, ...]] = (
+        "largest error of the pressure coefficient beyond 10 degrees",
+        "pressure coefficient",
+    )
 
     def solid(self) -> Solid:
         """Return concentric rings."""
