@@ -5,13 +5,53 @@ import os
 import sys
 from pathlib import Path
 
+from alsph.errors import ConfigError
 
-def free_memory() -> float:
+BYTES_PER_THREAD = 72 * 2**20
+"""Of the address space: a thread's stack, and what the C library reserves for its allocations."""
+
+OUTPUT_FACTOR = 1.5
+"""What a run takes with its outputs, in terms of what it takes to step."""
+
+
+def free_memory(threads: int = 0) -> float:
     """Return the memory that can be had without swapping and within the process's limits [bytes].
 
     Infinite where the system does not tell.
+
+    Parameters
+    ----------
+    threads
+        Threads that are yet to be started, which take of the limits.
     """
-    return max(0.0, min(_available(), _within_limits()))
+    return max(0.0, min(_available(), (_within_limits() - threads * BYTES_PER_THREAD) / OUTPUT_FACTOR))
+
+
+def check(what: str, particles: int, bytes_per_particle: float, threads: int | None) -> None:
+    """Refuse to make more particles than fit into the memory that is free: the engine cannot bear that it runs out.
+
+    Parameters
+    ----------
+    what
+        What asks for them.
+    particles
+        Number of particles.
+    bytes_per_particle
+        What each takes.
+    threads
+        Number of threads; all cores if None.
+
+    Raises
+    ------
+    ConfigError
+        If there are too many.
+    """
+    needed, free = particles * bytes_per_particle, free_memory(threads or os.cpu_count() or 1)
+    if needed > free:
+        raise ConfigError(
+            f"{what}: about {particles:,} particles need {needed / 2**30:.2g} GiB of memory and {free / 2**30:.2g} GiB "
+            "are free; lower the resolution"
+        )
 
 
 def _available() -> float:

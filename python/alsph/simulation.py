@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from alsph import _alsph
 from alsph.errors import ConfigError, SharedError, SolverError
 from alsph.geometry import FloatArray, Problem
+from alsph.memory import check
 from alsph.text import shown
 
 Inflow = Callable[[FloatArray, float], ArrayLike]
@@ -58,6 +59,10 @@ def _translated() -> Iterator[None]:
         raise ConfigError(str(error)) from None
     except _alsph.SolverError as error:
         raise SolverError(str(error)) from None
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":  # that of the engine's edge to Python, which it does not export
+            raise
+        raise SolverError(f"the engine gave up, probably as it was out of memory: {error}") from None
 
 
 def _exact(name: str, values: ArrayLike, kind: type[np.generic], dimensions: int | None = None) -> NDArray[Any]:
@@ -128,6 +133,9 @@ class Simulation:
     def _start(self, state: dict[str, Any], threads: int | None) -> None:
         if threads is not None and not (isinstance(threads, int) and threads >= 1):
             raise ConfigError(f"threads = {shown(threads)}: must be a whole number, 1 or more")
+        with _translated():
+            memory = _alsph.bytes_per_particle(json.dumps(self.problem.settings))
+        check(f"threads = {threads or 'all cores'}", np.size(state.get("kind", ())), memory, threads)
         exact = {name: _exact(name, state[name], *TYPES[name]) if name in TYPES else state[name] for name in state}
         with _translated():
             self._engine_of_process = _alsph.Simulation(json.dumps(self.problem.settings), exact, threads)

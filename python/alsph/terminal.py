@@ -31,6 +31,9 @@ def exit_codes() -> Iterator[None]:
     except (AlsphError, OSError) as error:
         complain(f"error: {error}", "red")
         raise typer.Exit(error.exit_code if isinstance(error, AlsphError) else 2) from None
+    except MemoryError:
+        complain("error: out of memory; lower the resolution or the number of threads", "red")
+        raise typer.Exit(2) from None
     except KeyboardInterrupt as stop:
         complain(str(stop) or "interrupted")
         raise typer.Exit(stop.exit_code if isinstance(stop, Interrupted) else INTERRUPTED) from None

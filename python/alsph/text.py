@@ -1,6 +1,7 @@
 """Texts of others, such as names, paths and what files hold: read with bounds, and shown without harm."""
 
 import errno
+import os
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,10 @@ def contents(path: Path, most_bytes: int) -> bytes:
     if path.exists() and not path.is_file():
         raise OSError(errno.EINVAL, "no regular file")
     with path.open("rb") as file:
-        found = file.read(most_bytes + 1)
-    if len(found) > most_bytes:
-        raise OSError(errno.EFBIG, f"larger than {most_bytes / 2**20:g} MiB")
-    return found
+        size = os.fstat(file.fileno()).st_size
+        if size > most_bytes:
+            raise OSError(errno.EFBIG, f"larger than {most_bytes / 2**20:g} MiB")
+        return file.read(size)
 
 
 def printable(text: str, *, lines: bool = False) -> str:

@@ -15,7 +15,7 @@ from pydantic import Field
 from alsph.errors import ConfigError
 from alsph.geometry import FloatArray, Kind, Problem
 from alsph.measures import Measure, Profile
-from alsph.memory import free_memory
+from alsph.memory import check
 from alsph.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -194,8 +194,13 @@ class Case(Parameters):
             "bodies": self.bodies(),
         }
 
-    def build(self) -> Problem:
+    def build(self, threads: int | None = None) -> Problem:
         """Return the problem that the engine starts from.
+
+        Parameters
+        ----------
+        threads
+            Number of threads that it will be solved with, which need memory; all cores if None.
 
         Raises
         ------
@@ -203,16 +208,12 @@ class Case(Parameters):
             If the particles would not fit into the memory that is free.
         """
         try:
-            needed, free = self.memory(), free_memory()
+            particles, memory = self.particle_estimate(), self.memory()
+            check(f"resolution = {self.resolution}", particles, memory / max(particles, 1), threads)
         except OverflowError:
             raise ConfigError(
                 f"{self.name}: more particles than can be counted; lower the resolution or the size"
             ) from None
-        if needed > free:
-            raise ConfigError(
-                f"resolution = {self.resolution}: about {self.particle_estimate():,} particles need "
-                f"{needed / 2**30:.1f} GiB of memory and {free / 2**30:.1f} GiB are free; lower the resolution"
-            )
         return self.problem(self.particles())
 
     def problem(self, state: dict[str, Any]) -> Problem:
@@ -239,7 +240,7 @@ class Case(Parameters):
         from alsph.sampling import initial_state
         from alsph.simulation import Simulation
 
-        problem = self.build()
+        problem = self.build(threads if isinstance(threads, int) else None)
         if initial_run is not None:
             problem = self.problem(initial_state(problem.state, Run(initial_run)))
         if warning := self.time_step_warning():
