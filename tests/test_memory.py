@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 import pytest
-from alsph import Simulation, memory
+from alsph import memory, resume
 from alsph.errors import ConfigError, SolverError
 from alsph.memory import free_memory
 
@@ -32,15 +32,15 @@ def test_a_limit_of_memory_is_an_error_and_no_abort(tmp_path, megabytes):
     assert (done.returncode == 0) == (megabytes == 700)
 
 
-def test_limits_count(monkeypatch, small):
+def test_limits_count(monkeypatch, small, tmp_path):
     whole = free_memory()
     monkeypatch.setattr(memory, "_within_limits", lambda: 2.0 * memory.BYTES_PER_THREAD)
     assert free_memory(1) < free_memory() < whole and free_memory(3) == 0
     with pytest.raises(ConfigError, match="resolution = 40: about 299,520 particles need 0.27 GiB of memory"):
         small.replace(resolution=40, length=14.0, height=13.0, upstream=4.0).build(1)
-    problem = small.build(1)
-    with pytest.raises(ConfigError, match="threads = 3: about"):
-        Simulation(problem, 3)
+    path = small.run(tmp_path / "run", until=0.02, threads=1, progress=False).path
+    with pytest.raises(ConfigError, match="resolution = 8: about 1,792 particles need .* and 0 GiB are free"):
+        resume(path, until=0.03, threads=3)
 
 
 def test_an_engine_that_panics_is_an_error(small, monkeypatch):

@@ -161,6 +161,7 @@ def _resume(folder: RunFolder, until: float | None, threads: int | None, control
             remarks.append("its checkpoint, of an older alsph, does not tell its settings: those in case.toml are used")
         elif changed := _changes(config, saved, folder):
             remarks.append(f"goes on with other settings than before: {', '.join(changed)}")
+        config.case.check_memory(config.run.threads)
         simulation = _restored(config, saved, folder)
         if saved.warning:
             folder.set_damaged_aside()

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from alsph import _alsph
 from alsph.errors import ConfigError, SharedError, SolverError
 from alsph.geometry import FloatArray, Problem
-from alsph.memory import check
 from alsph.text import shown
 
 Inflow = Callable[[FloatArray, float], ArrayLike]
@@ -133,9 +132,6 @@ class Simulation:
     def _start(self, state: dict[str, Any], threads: int | None) -> None:
         if threads is not None and not (isinstance(threads, int) and threads >= 1):
             raise ConfigError(f"threads = {shown(threads)}: must be a whole number, 1 or more")
-        with _translated():
-            memory = _alsph.bytes_per_particle(json.dumps(self.problem.settings))
-        check(f"threads = {threads or 'all cores'}", np.size(state.get("kind", ())), memory, threads)
         exact = {name: _exact(name, state[name], *TYPES[name]) if name in TYPES else state[name] for name in state}
         with _translated():
             self._engine_of_process = _alsph.Simulation(json.dumps(self.problem.settings), exact, threads)

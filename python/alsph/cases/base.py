@@ -207,6 +207,11 @@ class Case(Parameters):
         ConfigError
             If the particles would not fit into the memory that is free.
         """
+        self.check_memory(threads)
+        return self.problem(self.particles())
+
+    def check_memory(self, threads: int | None = None) -> None:
+        """Refuse what would not fit into the memory that is free, as :meth:`build` does."""
         try:
             particles, memory = self.particle_estimate(), self.memory()
             check(f"resolution = {self.resolution}", particles, memory / max(particles, 1), threads)
@@ -214,7 +219,6 @@ class Case(Parameters):
             raise ConfigError(
                 f"{self.name}: more particles than can be counted; lower the resolution or the size"
             ) from None
-        return self.problem(self.particles())
 
     def problem(self, state: dict[str, Any]) -> Problem:
         """Return this case with the given state, for instance one from a checkpoint."""
