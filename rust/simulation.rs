@@ -52,7 +52,6 @@ impl<const D: usize> Simulation<D> {
             return Err(setting("dimensions", format!("{} does not fit {D}-dimensional arrays", settings.dimensions)));
         }
         Instructions::chosen()?;
-        check_particles(&settings, &mut particles)?;
         if !(clock.time.is_finite() && clock.mass_in.is_finite() && clock.mass_out.is_finite()) {
             return Err(setting("state", format!("time and masses must be finite, not {clock:?}")));
         }
@@ -60,6 +59,8 @@ impl<const D: usize> Simulation<D> {
             .num_threads(threads.unwrap_or(0))
             .build()
             .map_err(|e| setting("threads", e.to_string()))?;
+        // Not with the threads that rayon shares, which a forked process does not have.
+        pool.install(|| check_particles(&settings, &mut particles))?;
         clock.next_id = clock.next_id.max(particles.id.iter().max().map_or(0, |id| id + 1));
         Ok(Self {
             walls: Walls::new(&settings),

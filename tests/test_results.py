@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from alsph import Run, reading, sampling
 from alsph.cases import Cylinder
-from alsph.errors import RunFolderError
+from alsph.config import Config
+from alsph.errors import ConfigError, RunFolderError
+from alsph.io import RunFolder
 from synthetic import CIRCULATION, DRAG, LIFT, STROUHAL, write_run
 
 
@@ -170,3 +172,41 @@ def test_what_an_hdf5_file_says_about_itself_is_not_trusted(damaged):
 def test_a_folder_that_is_not_there():
     with pytest.raises(RunFolderError, match="no such run folder"):
         Run("nowhere/at-all")
+
+
+def test_mistyped_names_are_refused_with_what_there_is(tmp_path, small):
+    run = small.run(tmp_path / "run", until=0.05, progress=False)
+    for use, message in (
+        (lambda: run.load("drag"), "axis = 'drag': unknown; known: x, y; the drag is x and the lift y"),
+        (lambda: run.load("z"), "axis = 'z': unknown; known: x, y"),
+        (lambda: run.load("x", "lowr"), "body = 'lowr': unknown; known: cylinder"),
+        (lambda: run.load("x", "cylindr"), "body = 'cylindr': unknown; did you mean 'cylinder'?"),
+        (lambda: run.coefficient("w", "presure"), "axis = 'w': unknown"),
+        (lambda: run.coefficient("x", "presure"), "part = 'presure': unknown; did you mean 'pressure'?"),
+        (lambda: run.coefficient("x", body=3), "body = 3: unknown; known: cylinder"),
+        (lambda: run.plot_forces(body="wing"), "body = 'wing': unknown; known: cylinder"),
+        (lambda: run.plot_spectrum(body="wing"), "body = 'wing': unknown; known: cylinder"),
+        (lambda: run.plot_field("vortcity"), "unknown field 'vortcity'; did you mean 'vorticity'?"),
+        (lambda: run.plot_field("vortcity", "late"), "unknown field 'vortcity'"),
+        (lambda: run.plot_field("pressure", view=(1, 2, 3)), "view = .1, 2, 3.: needs left, right, bottom and top"),
+        (lambda: run.plot_field("pressure", view=(2, 1, 0, 1)), "view = .2, 1, 0, 1.: needs left, right"),
+        (lambda: run.plot_field("pressure", limit="high"), "limit = 'high': must be a number above zero"),
+        (lambda: run.snapshot("late"), "time = 'late': must be a finite number"),
+        (lambda: run.snapshot([1.0]), r"time = \[1.0\]: must be a finite number"),
+        (lambda: run.momentum_balance((1, -1, 0), (3, 1, 1)), "needs corners of 2 numbers"),
+        (lambda: run.momentum_balance((3, -1), (1, 1)), "the lower one first"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            use()
+    assert np.isfinite(run.coefficient("x", "viscous", "cylinder")).all()
+    assert run.snapshot(np.float32(0.1)).time == run.times[-1]
+
+
+def test_bodies_are_known_before_the_first_step(tmp_path, small):
+    folder = RunFolder(tmp_path / "run")
+    folder.create(Config(small))
+    folder.announce(Config(small))
+    run = Run(folder.path)
+    assert run.coefficient("x", body="cylinder").size == 0
+    with pytest.raises(ConfigError, match="body = 'wing': unknown; known: cylinder"):
+        run.load("x", "wing")

@@ -12,10 +12,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import tomli_w
 from alsph import study
+from alsph.cases import Couette, Cylinder, TaylorGreen
 from alsph.errors import ConfigError, WalltimeError
 from alsph.study import Figure, Study, Sweep
 from alsph.study.execution import _jobs
+from alsph.study.results import names
 from alsph.study.state import RUNS, state
 
 DECAY = "decay rate of the kinetic energy, U/D"
@@ -372,3 +375,55 @@ def test_a_wall_time_ends_a_study_that_goes_on_later(tmp_path):
         study.run(declared, tmp_path, walltime=1.5, progress=False)
     assert {state.status for state in study.states(declared.points(), tmp_path).values()} <= {"stopped", "waiting"}
     assert study.run(declared, tmp_path, progress=False).complete
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"collect": ["mean drag"]}, "collect: no result 'mean drag'; did you mean 'mean drag coefficient'?"),
+        (
+            {"figures": [Figure(name="a", x="reynolds", y=["Strouhal number", "shedding period"])]},
+            "figure a, y: no result 'shedding period'; did you mean 'shedding periods'?",
+        ),
+        (
+            {"figures": [Figure(name="a", kind="profile", profile="pressure coeficient")]},
+            "figure a, profile: no result 'pressure coeficient'; did you mean 'pressure coefficient'?",
+        ),
+    ],
+)
+def test_a_result_that_no_run_will_have_is_refused_before_the_first(tmp_path, alsph, changes, message):
+    wrong = Study(name="a", base={"case": "cylinder"}, sweep=Sweep(product={"reynolds": [50]}), **changes)
+    with pytest.raises(ConfigError) as error:
+        study.run(wrong, tmp_path / "out", progress=False)
+    assert str(error.value) == message and not (tmp_path / "out").exists()
+    file = tmp_path / "a.toml"
+    tables = wrong.model_dump(exclude_defaults=True)
+    file.write_text(tomli_w.dumps({"figure" if key == "figures" else key: tables[key] for key in tables}))
+    for arguments in (["--dry-run"], []):
+        code, output, complaints = alsph("study", "run", file, "-o", tmp_path / "out", *arguments)
+        assert (code, output, complaints) == (2, "", f"error: {message}\n")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        Cylinder(reynolds=100, resolution=8, length=5.0, height=4.0, upstream=2.0),
+        TaylorGreen(dimensions=3, resolution=8, reynolds=100),
+        TaylorGreen(resolution=8),
+        Couette(resolution=8),
+    ],
+    ids=lambda case: f"{case.name}{case.space_dimensions}",
+)
+def test_the_results_of_a_run_are_known_beforehand(tmp_path, case):
+    run = case.run(tmp_path / "run", until=0.12, output_interval=0.02, progress=False)
+    results, profiles = names(run.config)
+    assert {measure.name for measure in run.measures} <= results
+    for profile in run.profiles:
+        assert profile.name in profiles or profile.name.startswith("velocity at tU/D = ")
+
+
+@pytest.mark.parametrize("name", study.shipped())
+def test_the_studies_that_come_with_alsph_ask_for_what_there_is(name):
+    declared = study.load(name)
+    study.check_names(declared, declared.points())

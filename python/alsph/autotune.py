@@ -16,6 +16,7 @@ from rich.console import Console
 
 from alsph.cases import Case
 from alsph.config import Config
+from alsph.durable import write_text
 from alsph.errors import ConfigError, SolverError
 from alsph.progress import duration
 from alsph.tables import markdown
@@ -119,8 +120,8 @@ class Tuning:
         """Write ``case.toml`` with the tuned case and ``report.md`` into a folder."""
         folder = Path(path)
         folder.mkdir(parents=True, exist_ok=True)
-        Config(self.case).save(folder / "case.toml")
-        (folder / "report.md").write_text(f"# Autotune of {self.case.name}\n\n{self}\n", encoding="utf-8")
+        write_text(folder / "case.toml", Config(self.case).text())
+        write_text(folder / "report.md", f"# Autotune of {self.case.name}\n\n{self}\n")
 
 
 def autotune(

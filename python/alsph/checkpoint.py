@@ -19,7 +19,7 @@ import numpy as np
 from alsph.durable import replacing
 from alsph.errors import DamagedError, RunFolderError
 from alsph.inflow import Prescription
-from alsph.reading import DAMAGE, sound
+from alsph.reading import DAMAGE, rows, sound
 
 VERSION = 2
 HEAD_BYTES = 512
@@ -98,8 +98,8 @@ def read(path: Path) -> Checkpoint:
         _check_head(path)
         with h5py.File(path, "r", locking=False) as file:
             state = {name: _number(file, name) for name in file.attrs}
-            state |= {name: sound(file, name)[()] for name in ARRAYS if name in file}
-            case = json.loads(sound(file, CASE)[()].tobytes()) if CASE in file else None
+            state |= {name: rows(sound(file, name)) for name in ARRAYS if name in file}
+            case = json.loads(rows(sound(file, CASE)).tobytes()) if CASE in file else None
             inflow = _inflow(file)
         if not isinstance(case, dict | None):
             raise ValueError("its case is no table")

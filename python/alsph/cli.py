@@ -7,9 +7,7 @@ import functools
 import inspect
 import signal
 import types
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -21,32 +19,17 @@ from alsph.autotune import autotune
 from alsph.config import Config, RunSettings
 from alsph.convergence import converge
 from alsph.describe import describe
-from alsph.errors import AlsphError, ConfigError, Interrupted, WalltimeError
+from alsph.durable import check_folder
+from alsph.errors import ConfigError
 from alsph.parameters import Parameters, describe_default
 from alsph.progress import seconds_of
 from alsph.repetition import repeat
 from alsph.results import Run
 from alsph.run import Control, resume, start
 from alsph.study.board import overview
+from alsph.terminal import CommandLine, call, complain, exit_codes, say, say_table
+from alsph.text import printable, shown
 from alsph.validation import validate
-
-INTERRUPTED = 130
-
-
-@contextmanager
-def _exit_codes() -> Iterator[None]:
-    """Turn errors into one line on stderr and an exit code, see docs/reliability.md."""
-    try:
-        yield
-    except WalltimeError as stop:
-        typer.echo(str(stop), err=True)
-        raise typer.Exit(stop.exit_code) from None
-    except (AlsphError, OSError) as error:
-        typer.secho(f"error: {error}", fg="red", err=True)
-        raise typer.Exit(error.exit_code if isinstance(error, AlsphError) else 2) from None
-    except KeyboardInterrupt as stop:
-        typer.echo(str(stop) or "interrupted", err=True)
-        raise typer.Exit(stop.exit_code if isinstance(stop, Interrupted) else INTERRUPTED) from None
 
 
 class CaseGroup(TyperGroup):
@@ -54,14 +37,14 @@ class CaseGroup(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of a case, or of the case in a file."""
-        with _exit_codes():
+        with exit_codes():
             if cmd_name.endswith(".toml"):
                 ctx.obj = config.load(cmd_name)
                 cmd_name = ctx.obj.case.name
             return super().get_command(ctx, cases.find(cmd_name).name)
 
 
-class Commands(TyperGroup):
+class Commands(CommandLine):
     """The commands in the order in which they are used."""
 
     def list_commands(self, ctx: Any) -> list[str]:
@@ -137,6 +120,8 @@ Walltime = Annotated[
 ]
 Retry = Annotated[int, typer.Option(help="how often a run that breaks down goes back and on with half the time step")]
 Threads = Annotated[int | None, typer.Option(help="number of threads", show_default="the run's")]
+WORDS = {int: "a whole number", float: "a number"}
+METAVARS = {int: "INTEGER", float: "FLOAT"}
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="run folder")]
 
 
@@ -155,7 +140,7 @@ def _describe(
     configuration: Config,
     probe: Annotated[bool, typer.Option(help="take a few steps to estimate the time")] = True,
 ) -> None:
-    _print_table(describe(configuration, probe=probe))
+    say_table(describe(configuration, probe=probe))
 
 
 def _autotune(
@@ -174,7 +159,7 @@ def _autotune(
         configuration.case, divergence, develop=develop, probe=probe, margin=margin, threads=configuration.run.threads
     )
     tuning.save(folder)
-    typer.echo(f"\n{tuning}\n\nalsph run {folder / 'case.toml'}")
+    say(f"\n{tuning}\n\nalsph run {folder / 'case.toml'}")
 
 
 def _converge(
@@ -190,7 +175,7 @@ def _converge(
         raise ConfigError(f"resolutions = {resolutions!r}: must be whole numbers with commas, as 10,14,20") from None
     threads = configuration.run.threads or 1
     report = converge(configuration, ladder, output, jobs=jobs, threads=threads, scheduler=scheduler)
-    typer.echo(f"\n{report}\n{report.path / 'convergence.md'}")
+    say(f"\n{report}\n{report.path / 'convergence.md'}")
     raise typer.Exit(not report.results.complete)
 
 
@@ -198,7 +183,7 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
     """Return a command for a case: `action` called with the configuration that the options make."""
     own = list(inspect.signature(action).parameters.values())[1:]
 
-    @_exit_codes()
+    @exit_codes()
     def command(context: typer.Context, **values: Any) -> None:
         extra = {parameter.name: values.pop(parameter.name) for parameter in own}
         tables = (context.obj or Config(model())).tables()
@@ -232,8 +217,8 @@ def _options(model: type[Parameters], names: Iterable[str], defaults: Mapping[st
             f"{flag}/--no-{flag[2:]}" if kind is bool else flag,
             help=f"{model.describe(name)}  [default: {defaults.get(name) or describe_default(model, name)}]",
             show_default=False,
-            metavar="|".join(map(str, choices)) or None,
-            parser=_choice_of(choices) if choices else None,
+            metavar="|".join(map(str, choices)) or METAVARS.get(kind),
+            parser=_choice_of(choices) if choices else _number_of(kind) if kind in WORDS else None,
         )
         yield inspect.Parameter(
             name,
@@ -261,6 +246,18 @@ def _choice_of(choices: tuple[Any, ...]) -> Callable[[str], Any]:
     return choice
 
 
+def _number_of(kind: type[int | float]) -> Callable[[str], int | float]:
+    """Return a function that reads a number, and says what is wrong with one."""
+
+    def number(text: str) -> int | float:
+        try:
+            return kind(text)
+        except ValueError:
+            raise typer.BadParameter(f"must be {WORDS[kind]}, not {shown(text)}") from None
+
+    return number
+
+
 for _model in cases.CASES.values():
     for _group, _action in (
         (run_app, _run),
@@ -273,7 +270,7 @@ for _model in cases.CASES.values():
 
 
 @app.command("resume")
-@_exit_codes()
+@exit_codes()
 def _resume(
     path: RunPath,
     until: Annotated[float | None, typer.Option(help="new end time [D/U]", show_default="the run's")] = None,
@@ -286,19 +283,19 @@ def _resume(
 
 
 @app.command("repeat")
-@_exit_codes()
+@exit_codes()
 def _repeat(path: RunPath, threads: Threads = None) -> None:
     """Repeat a run from its start, without writing anything, and compare it bit by bit.
 
     The exit code is 1 if it is not the same.
     """
     repetition = repeat(path, threads)
-    typer.echo(str(repetition))
+    say(repetition)
     raise typer.Exit(not repetition.same)
 
 
 @app.command("plot")
-@_exit_codes()
+@exit_codes()
 def _plot(
     path: RunPath,
     field: Annotated[
@@ -321,7 +318,8 @@ def _plot(
         plotting.field_style(name)
     figures = output or path / "figures"
     drawings: dict[str, Callable[[Path], object]] = {
-        profile.file_name: plotting.profile({"computed": profile}).savefig for profile in run.profiles
+        profile.file_name: functools.partial(plotting.save, plotting.profile({"computed": profile}))
+        for profile in run.profiles
     }
     drawings["ledger"] = run.plot_ledger
     if run.body:
@@ -329,14 +327,18 @@ def _plot(
     if run.config.case.surface_points():
         drawings["pressure_coefficient"] = run.plot_pressure_coefficient
     drawings |= {name: functools.partial(run.plot_field, name, time) for name in field}
+    if not output:
+        check_folder(figures)
     figures.mkdir(parents=True, exist_ok=True)
+    if time is not None and field:
+        complain(f"fields at t* = {run.snapshot(time).time:.6g}, the output nearest to {time:g}")
     for name, draw in drawings.items():
         draw(figures / f"{name}.png")
-        typer.echo(figures / f"{name}.png")
+        say(figures / f"{name}.png")
 
 
 @app.command("validate")
-@_exit_codes()
+@exit_codes()
 def _validate(
     names: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="cases; all if none is given")] = None,
     full: Annotated[bool, typer.Option("--full/--quick", help="hours, or minutes, on two cores")] = False,
@@ -354,12 +356,12 @@ def _validate(
     goes on when it is started again.
     """
     report = validate(*(names or ()), full=full, resolutions=resolution or (), threads=threads, output=output)
-    typer.echo(f"\n{report}\n{report.path / 'report.md'}")
+    say(f"\n{report}\n{report.path / 'report.md'}")
     raise typer.Exit(not report.passed)
 
 
 @study_app.command("run")
-@_exit_codes()
+@exit_codes()
 def _study_run(
     name: StudyName,
     preset: Preset = None,
@@ -377,25 +379,26 @@ def _study_run(
     """
     declared = study.load(name, preset)
     if dry_run:
+        study.check_names(declared, declared.points())
         _print_states(declared, output)
         return
     results = study.run(
         declared, output, jobs=jobs, threads=threads, scheduler=scheduler, walltime=seconds_of(walltime)
     )
-    typer.echo(f"\n{results}")
+    say(f"\n{results}")
     _print_results(results)
     raise typer.Exit(not results.complete)
 
 
 @study_app.command("status")
-@_exit_codes()
+@exit_codes()
 def _study_status(name: StudyName, preset: Preset = None, output: StudyOutput = Path("runs/studies")) -> None:
     """Tell how far the runs of a study are, whoever runs them."""
     _print_states(study.load(name, preset), output)
 
 
 @study_app.command("draw")
-@_exit_codes()
+@exit_codes()
 def _study_draw(name: StudyName, preset: Preset = None, output: StudyOutput = Path("runs/studies")) -> None:
     """Write tables and figures of the runs that there are, without running anything."""
     declared = study.load(name, preset)
@@ -407,23 +410,23 @@ def _study_draw(name: StudyName, preset: Preset = None, output: StudyOutput = Pa
 @study_app.command("list")
 def _study_list() -> None:
     """List the studies that come with alsph."""
-    _print_table([(name, study.load(name).title) for name in study.shipped()])
+    say_table([(name, study.load(name).title) for name in study.shipped()])
 
 
 def _print_results(results: study.Results) -> None:
     for warning in results.warnings:
-        typer.secho(f"warning: {warning}", fg="yellow", err=True)
-    typer.echo(results.path / "results.md")
+        complain(f"warning: {warning}", "yellow")
+    say(results.path / "results.md")
 
 
 def _print_states(declared: study.Study, output: Path) -> None:
     points = declared.points()
     for line in overview(points, study.states(points, output)):
-        typer.echo(line)
+        say(printable(line))
 
 
 @app.command("info")
-@_exit_codes()
+@exit_codes()
 def _info(path: RunPath) -> None:
     """Tell the state and the results of a run."""
     _report(Run(path))
@@ -432,29 +435,22 @@ def _info(path: RunPath) -> None:
 @app.command("cases")
 def _cases() -> None:
     """List the cases."""
-    _print_table([(name, model.title) for name, model in cases.CASES.items()])
+    say_table([(name, model.title) for name, model in cases.CASES.items()])
 
 
 @app.callback(invoke_without_command=True)
 def _version(version: Annotated[bool, typer.Option("--version", help="print the version")] = False) -> None:
     if version:
-        typer.echo(_alsph.__version__)
+        say(_alsph.__version__)
         raise typer.Exit
 
 
 def _report(run: Run) -> None:
-    _print_table([("run folder", str(run.path))] + [(name, str(value)) for name, value in run.summary().items()])
-
-
-def _print_table(rows: list[tuple[str, str]]) -> None:
-    width = max(len(name) for name, _ in rows)
-    for name, value in rows:
-        typer.echo(f"{name:{width}}  {value}")
+    say_table([("run folder", str(run.path))] + [(name, str(value)) for name, value in run.summary().items()])
 
 
 def main() -> None:
     """Run the command line."""
-    warnings.formatwarning = lambda message, *_args, **_kwargs: f"warning: {message}\n"
     # Shells have the background jobs of a script ignore SIGINT: it shall stop a study there, too, as it does a run.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    app()
+    call(app)

@@ -1,9 +1,11 @@
 """Configuration files: a case and the settings of a run, from and to TOML."""
 
 import os
+import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,8 +15,15 @@ from pydantic import Field
 from alsph import cases
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters
+from alsph.text import contents, shown
 
 Made = TypeVar("Made")
+Set = TypeVar("Set", bound=Parameters)
+
+MOST_BYTES = 2**22
+"""Of a configuration file."""
+
+LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:"[^"\n]*"|'[^'\n]*'|[\w-]+)[ \t]*\.[ \t]*){99}""")
 
 
 class RunSettings(Parameters):
@@ -68,9 +77,13 @@ class Config:
         values = {name: values[name] for name in self.case.parameter_names()}
         return {"case": self.case.name} | {name: value for name, value in values.items() if value is not None}
 
+    def text(self) -> str:
+        """Return the configuration with all its parameters as TOML."""
+        return tomli_w.dumps(self.tables(), multiline_strings=True)
+
     def save(self, path: Path) -> None:
         """Write the configuration with all its parameters to a TOML file."""
-        path.write_text(tomli_w.dumps(self.tables(), multiline_strings=True), encoding="utf-8")
+        path.write_bytes(self.text().encode())
 
 
 def from_tables(tables: dict[str, Any], *folders: Path) -> Config:
@@ -93,17 +106,41 @@ def from_tables(tables: dict[str, Any], *folders: Path) -> Config:
     if not isinstance(name, str):
         raise ConfigError('case: missing, or not a string; add for instance case = "cylinder"')
     if not isinstance(run, dict):
-        raise ConfigError(f"run = {run!r}: must be a table, [run]")
+        raise ConfigError(f"run = {shown(run)}: must be a table, [run]")
     shape = parameters.get("shape")
     if isinstance(shape, str) and shape not in cases.body.SHAPES:
         parameters["shape"] = _found(shape, folders)
     if isinstance(initial_run := run.get("initial_run"), str):
         run = run | {"initial_run": _found(initial_run, (*folders, Path()))}
-    case = cases.find(name)(**parameters)
+    model = cases.find(name)
+    _check_places(model, parameters, run)
+    mistakes: list[str] = []
+    case, settings = _made(model, parameters, "", mistakes), _made(RunSettings, run, "run.", mistakes)
+    if case is None or settings is None:
+        raise ConfigError(*mistakes)
+    return Config(case, settings)
+
+
+def _made(kind: type[Set], values: dict[str, Any], prefix: str, mistakes: list[str]) -> Set | None:
+    """Return a set of parameters, or add what is wrong with them to the mistakes."""
     try:
-        return Config(case, RunSettings(**run))
+        return kind(**values)
     except ConfigError as error:
-        raise ConfigError(f"run.{error}") from None
+        mistakes += [f"{prefix}{mistake}" for mistake in error.mistakes]
+    return None
+
+
+def _check_places(model: type[cases.Case], parameters: dict[str, Any], run: dict[str, Any]) -> None:
+    """Refuse tables that are not known, and what stands in the table of the other kind."""
+    for name, value in parameters.items():
+        if isinstance(value, dict) and name not in model.model_fields:
+            known = "did you mean [run]?" if get_close_matches(name, ["run"]) else "only [run] is"
+            raise ConfigError(f"[{name}]: unknown table; {known}")
+        if name in RunSettings.model_fields and name not in model.model_fields:
+            raise ConfigError(f"{name}: a setting of the run; put it below a line [run]")
+    for name in run:
+        if name in model.model_fields and name not in RunSettings.model_fields:
+            raise ConfigError(f"run.{name}: a parameter of the case; put it above the line [run]")
 
 
 def _found(path: str, folders: tuple[Path, ...]) -> str:
@@ -139,10 +176,30 @@ def read(path: str | Path, make: Callable[[dict[str, Any]], Made]) -> Made:
         If the file cannot be read, or the function raises one; the message starts with the file's name.
     """
     try:
-        return make(tomllib.loads(Path(path).read_text(encoding="utf-8")))
+        tables = _tables(contents(Path(path), MOST_BYTES).decode("utf-8-sig"))
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not a TOML file: {error}") from None
+    except UnicodeDecodeError:
+        raise ConfigError(f"{path}: not a TOML file: it is not text in UTF-8; save it as such") from None
+    except RecursionError:
+        raise ConfigError(f"{path}: not a TOML file that alsph can use: it is nested too deeply") from None
+    except ValueError as error:
+        raise ConfigError(f"{path}: not a TOML file: {_reason(error)}") from None
+    try:
+        return make(tables)
+    except RecursionError:
+        raise ConfigError(f"{path}: nested too deeply") from None
     except ConfigError as error:
         raise ConfigError(f"{path}: {error}") from None
+
+
+def _tables(text: str) -> dict[str, Any]:
+    """Parse TOML; keys of very many parts, which take the parser memory by their square, are refused."""
+    if LONG_KEY.search(text):
+        raise RecursionError
+    return tomllib.loads(text.replace("\r\n", "\n"))
+
+
+def _reason(error: ValueError) -> str:
+    """Return what the parser says; if it is Python that says it, a number has thousands of digits."""
+    return str(error) if isinstance(error, tomllib.TOMLDecodeError) else "a number in it has too many digits"

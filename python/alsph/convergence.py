@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from alsph import plotting, study
 from alsph.config import Config
+from alsph.durable import write_text
 from alsph.errors import ConfigError
 from alsph.plotting import Curve
 from alsph.results import Run
@@ -176,9 +177,9 @@ class Report:
         picture = self.draw()
         lines = ["# Convergence", str(self)]
         if picture:
-            picture.savefig(self.path / "convergence.png", dpi=120)
+            plotting.save(picture, self.path / "convergence.png", dpi=120)
             lines.append("![Each measure over the particle spacing](convergence.png)")
-        (self.path / "convergence.md").write_text("\n\n".join(lines) + "\n", encoding="utf-8")
+        write_text(self.path / "convergence.md", "\n\n".join(lines) + "\n")
 
 
 def converge(

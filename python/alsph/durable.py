@@ -20,6 +20,8 @@ from typing import Any, Literal
 
 import h5py
 
+from alsph.errors import RunFolderError
+
 PAGE = 4096
 MAGIC = b"alsph journal 1\n"
 
@@ -38,6 +40,37 @@ def replacing(path: Path, keep: Path | None = None) -> Iterator[Path]:
         flush(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_target(path: Path) -> None:
+    """Refuse to write a file through a link or into a device, which may lie anywhere.
+
+    Raises
+    ------
+    RunFolderError
+        If there is one with that path.
+    """
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        raise RunFolderError(f"{path}: a link or a special file, and alsph does not write through it; remove it first")
+
+
+def check_folder(path: Path) -> None:
+    """Refuse a folder that is a link.
+
+    Raises
+    ------
+    RunFolderError
+        If it is one.
+    """
+    if path.is_symlink():
+        raise RunFolderError(f"{path}: a link, and alsph does not write through it; remove it, or give another folder")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, in place of what was there and never through a link."""
+    check_target(path)
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def flush(path: Path) -> None:

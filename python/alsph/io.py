@@ -8,11 +8,13 @@ import csv
 import itertools
 import json
 import os
+import platform
+import re
 import shutil
 import time as clock
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +30,7 @@ from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.geometry import FloatArray
 from alsph.inflow import Prescription
 from alsph.reading import DAMAGE, sound
+from alsph.text import printable
 
 try:
     import fcntl
@@ -39,6 +42,17 @@ LOCK = ".lock"
 CHECKPOINTS = ("checkpoint.h5", "checkpoint.previous.h5")
 START = "start.h5"
 """The particles that a run began with, in the form of a checkpoint, where they are not its case's own."""
+MARKS = ("case.toml", "run.json")
+"""What tells that a folder is a run folder."""
+OWN = re.compile(
+    r"\.?(case\.toml|run\.json|run\.log|\.?lock|(checkpoint(\.previous)?|history|particles|surface|start|breakdown)(\.damaged\d*)?"
+    r"\.(h5|csv|vtkhdf))(\.new|\.journal)?"
+    r"|(ledger|forces|spectrum|pressure(_coefficient)?|vorticity|velocity(_divergence|_at_tu_d_\w+)?|kinetic_energy"
+    r"|[uv]_at_[xy]_d_2)\.png"
+)
+"""Names of the files that alsph makes in a run folder and its figures, and removes when the folder is replaced."""
+UNFINISHED = ("starting", "running", "interrupted")
+"""What ``run.json`` says of a run that goes on or can go on."""
 SPARE_BYTES = 2 * 2**20
 """Room that must stay free on the disk beside what is written next."""
 PATIENCE_SECONDS = 2.0
@@ -58,7 +72,7 @@ class RunFolder:
     path: Path
     _claim: os.stat_result | None = field(default=None, init=False, repr=False)
 
-    def check_new(self, *, force: bool) -> None:
+    def check_new(self, *, force: bool, configuration: config.Config | None = None) -> None:
         """Check, without touching anything, that the folder can be created (or, with `force`, replaced)."""
         if self.path.exists():
             found = {entry.name for entry in self.path.iterdir()} if self.path.is_dir() else {self.path.name}
@@ -66,13 +80,24 @@ class RunFolder:
                 raise RunFolderError(
                     f"{self.path}: exists already; give another folder, `alsph resume` it, or use --force"
                 )
-            if found and not found & {LOCK, "run.json"}:
+            if found - {LOCK} and not self._is_replaceable(configuration):
                 raise RunFolderError(
-                    f"{self.path}: not a run folder, so --force does not replace it; give another folder"
+                    f"{self.path}: not a run folder, so --force does not replace it, without its "
+                    f"{' and '.join(MARKS)}; give another folder"
                 )
         parent = next(parent for parent in self.path.absolute().parents if parent.exists())
         if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
             raise RunFolderError(f"{self.path}: cannot be created, {parent} is not a folder that can be written to")
+
+    def _is_replaceable(self, configuration: config.Config | None) -> bool:
+        """Whether the folder is that of a run, or was about to become that of this one when it was cut."""
+        case, info = (self._file(name) for name in MARKS)
+        try:
+            if info.exists():
+                return case.is_file() and "status" in reading.info(info)
+            return configuration is not None and case.read_bytes() == configuration.text().encode()
+        except (OSError, RunFolderError):
+            return False
 
     @contextmanager
     def claimed(self) -> Iterator[None]:
@@ -100,8 +125,8 @@ class RunFolder:
                     f"{entry}: a link or a special file; alsph does not write to a folder that has one"
                 )
 
-    def is_busy(self) -> bool:
-        """Whether a living process, wherever it is, holds the folder."""
+    def is_busy(self) -> bool | None:
+        """Whether a living process, wherever it is, holds the folder; None where that cannot be told."""
         try:
             if fcntl is None:
                 if self._file(LOCK).exists():
@@ -113,8 +138,10 @@ class RunFolder:
             return False
         except (BlockingIOError, filelock.Timeout):
             return True
-        except OSError:  # no lock, or none that can be read
+        except FileNotFoundError:
             return False
+        except OSError:  # a lock that cannot be read
+            return None
 
     def _holder(self) -> str:
         """Who is at work in the folder, in words."""
@@ -124,17 +151,24 @@ class RunFolder:
         return f"process {info.get('pid', '?')} on {name or 'a machine not known'} is still running it"
 
     def create(self, configuration: config.Config, size: int = 0) -> None:
-        """Begin with the resolved configuration if `size` bytes will fit; what the folder held is removed."""
+        """Begin with the resolved configuration if `size` bytes will fit; alsph's own files of before are removed."""
         self._make_room(size)
         with self._writing():
             self.path.mkdir(parents=True, exist_ok=True)
-            # What tells that this is a run folder goes last, so that a cut leaves one.
-            for path in sorted(self.path.iterdir(), key=lambda path: path.name in ("case.toml", "run.json")):
-                if path.is_dir() and not path.is_symlink():
-                    shutil.rmtree(path)
-                elif path.name != LOCK:
+            if self._file("run.json").exists():
+                self.announce(configuration)  # before the run that it tells of is no more
+            for path in [*self.path.iterdir(), *self._file("figures").glob("*.png")]:
+                # What tells that this is a run folder stays, so that a cut leaves one.
+                if OWN.fullmatch(path.name) and path.name not in (*MARKS, LOCK) and not path.is_dir():
                     path.unlink()
+            with suppress(OSError):  # unless there is something of the user's in it
+                self._file("figures").rmdir()
         self.write_config(configuration)
+
+    def announce(self, configuration: config.Config) -> None:
+        """Replace ``run.json`` by that of a run before its first step."""
+        facts = {"status": "starting", "case": configuration.case.name, "until": configuration.until}
+        self.write_info(facts | {"pid": os.getpid(), "machine": {"name": platform.node()}})
 
     def write_config(self, configuration: config.Config) -> None:
         """Replace ``case.toml``."""
@@ -173,7 +207,7 @@ class RunFolder:
     def log(self, line: str) -> None:
         """Append a line to ``run.log``."""
         with self._writing(), self._file("run.log").open("a", encoding="utf-8") as file:
-            file.write(f"{clock.strftime('%Y-%m-%d %H:%M:%S')}  {line}\n")
+            file.write(f"{clock.strftime('%Y-%m-%d %H:%M:%S')}  {printable(line)}\n")
 
     def append_history(self, rows: dict[str, NDArray[Any]], bodies: list[str]) -> None:
         """Append rows of :meth:`alsph.Simulation.new_history` to ``history.csv``."""

@@ -9,6 +9,35 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from alsph.errors import ConfigError
+from alsph.text import shown
+
+WHOLE, NUMBER = "must be a whole number", "must be a number"
+WORDS = {
+    "int_type": WHOLE,
+    "int_from_float": WHOLE,
+    "int_parsing": WHOLE,
+    "int_parsing_size": "must be a smaller number",
+    "float_type": NUMBER,
+    "float_parsing": NUMBER,
+    "finite_number": "must be a finite number",
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be greater than or equal to {ge:g}",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be less than or equal to {le:g}",
+    "bool_type": "must be true or false",
+    "string_type": "must be a text",
+    "string_too_short": "must not be empty",
+    "string_pattern_mismatch": "may hold letters, digits, _ and - only",
+    "literal_error": "must be {expected}",
+    "list_type": "must be a list",
+    "dict_type": "must be a table",
+    "value_error": "{error}",
+    "missing": "is missing",
+}
+"""What is wrong with a value, by pydantic's type of the error, with the entries of its context."""
+
+MOST_MISTAKES = 3
+"""How many are told at once."""
 
 
 class Parameters(BaseModel):
@@ -22,11 +51,17 @@ class Parameters(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False, validate_default=True)
 
-    def __init__(self, **values: Any) -> None:
+    def __init__(self, *unnamed: Any, **values: Any) -> None:
+        if unnamed:
+            kind, name = type(self).__name__, next(iter(type(self).model_fields))
+            raise ConfigError(f"{kind}: parameters are given by name, as {kind}({name}={shown(unnamed[0])})")
         try:
-            super().__init__(**{name: _plain(value) for name, value in values.items()})
+            super().__init__(**{name: _plain(name, value) for name, value in values.items()})
         except ValidationError as error:
-            raise ConfigError(_one_line(type(self), error)) from None
+            raise ConfigError(*_mistakes(type(self), error)) from None
+        except OverflowError:  # in a validator
+            sizes = {name: abs(value) for name, value in values.items() if isinstance(value, int | float)}
+            raise ConfigError(f"{max(sizes, key=lambda name: sizes[name], default='a value')}: too large") from None
 
     def replace(self, **changes: Any) -> Self:
         """Return a set with some parameters changed: ``case.replace(reynolds=100)``."""
@@ -56,6 +91,19 @@ def describe_default(model: type[Parameters], name: str) -> str:
     return "automatic" if default is None else f"{default:.6g}" if isinstance(default, float) else str(default).lower()
 
 
+def choose(what: str, name: object, known: Iterable[str]) -> None:
+    """Refuse a name that is not known.
+
+    Raises
+    ------
+    ConfigError
+        With what is known, or the name that was probably meant.
+    """
+    known = list(known)
+    if name not in known:
+        raise ConfigError(f"{what} = {shown(name)}: unknown; {suggest(str(name), known)}")
+
+
 def suggest(name: str, known: Iterable[str]) -> str:
     """Return ``did you mean ...?`` for a misspelt name, or the list of what is known."""
     known = list(known)
@@ -63,21 +111,37 @@ def suggest(name: str, known: Iterable[str]) -> str:
     return f"did you mean '{close[0]}'?" if close else f"known: {', '.join(known)}"
 
 
-def _plain(value: Any) -> Any:
-    """Numpy scalars as Python numbers, so that parameters may come from arrays."""
-    return value.item() if isinstance(value, np.generic) else value
+def _plain(name: str, value: Any) -> Any:
+    """Numpy scalars as Python numbers, so that parameters may come from arrays; texts must go into a file."""
+    if isinstance(value, str) and not value.isascii():
+        try:
+            value.encode()
+        except UnicodeEncodeError:
+            raise ConfigError(f"{name} = {shown(value)}: must be a text in UTF-8, as case.toml is") from None
+    return value.item() if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 else value
 
 
-def _one_line(model: type[Parameters], error: ValidationError) -> str:
-    first, *others = error.errors()
-    name = str(first["loc"][0]) if first["loc"] else ""
-    message = first["msg"].removeprefix("Value error, ").replace("Input should", "must", 1)
-    if first["type"] == "extra_forbidden":
-        text = f"{name}: unknown parameter; {suggest(name, model.model_fields)}"
-    elif name:
-        value = repr(first["input"])
-        value = value if len(value) < 200 else f"{value[:200]}..."
-        text = f"{name} = {value}: {message} ({model.describe(name)})"
-    else:
-        text = message
-    return f"{text} (and {len(others)} more)" if others else text
+def _mistakes(model: type[Parameters], error: ValidationError) -> list[str]:
+    mistakes = error.errors()
+    texts = [_mistake(model, mistake) for mistake in mistakes[:MOST_MISTAKES]]
+    others = len(mistakes) - len(texts)
+    return [*texts, f"and {others} more"] if others else texts
+
+
+def _mistake(model: type[Parameters], mistake: Any) -> str:
+    """Say what is wrong with one value."""
+    words = WORDS.get(mistake["type"], "cannot be used").format(**mistake.get("ctx", {}))
+    if not mistake["loc"]:
+        return words
+    name, value = ".".join(map(str, mistake["loc"])), mistake["input"]
+    if mistake["type"] == "extra_forbidden":
+        return f"{name}: unknown parameter; {suggest(name, model.model_fields)}"
+    if mistake["type"] == "missing":
+        return f"{name}: {words}"
+    if words in (WHOLE, NUMBER) and isinstance(value, str):
+        words += ", without quotes"
+    if words == NUMBER and isinstance(value, int) and not isinstance(value, bool):
+        words = WORDS["int_parsing_size"]
+    if words == WHOLE and isinstance(value, float) and value.is_integer():
+        words += f", as {value:.0f}"
+    return f"{name} = {shown(value)}: {words} ({model.describe(str(mistake['loc'][0]))})"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,10 +14,12 @@ from matplotlib.figure import Figure
 from scipy.ndimage import binary_fill_holes
 
 from alsph import analysis, sampling
+from alsph.durable import check_target, replacing
 from alsph.errors import ConfigError
 from alsph.geometry import FloatArray, Kind
 from alsph.parameters import suggest
 from alsph.reading import Snapshot
+from alsph.text import shown
 
 if TYPE_CHECKING:
     from alsph.analysis import Window
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
     from alsph.results import PressureCoefficient, Run
 
 PIXELS_PER_SPACING = 2
+LARGEST_VIEW = 20_000  # spacings that a picture is wide or high at most
 TIME_LABEL = "$tU/D$"
 
 
@@ -43,6 +47,34 @@ FIELDS = {
     "velocity": FieldStyle(r"velocity $|\mathbf{u}|/U$", "viridis", False),
     "velocity_divergence": FieldStyle(r"velocity divergence $\nabla\cdot\mathbf{u}\,D/U$", "PuOr_r", True),
 }
+
+
+def save(figure: Figure, path: str | Path, **options: Any) -> None:
+    """Save a figure in a file; what was there is replaced, and nothing is written through a link.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : path
+        The file, whose suffix says the format: PNG if there is none.
+    **options
+        Of matplotlib's ``savefig``.
+
+    Raises
+    ------
+    ConfigError
+        If the format is unknown.
+    RunFolderError
+        If the file is a link or a special file.
+    """
+    path = Path(path)
+    path = path if path.suffix else path.with_suffix(".png")
+    known = figure.canvas.get_supported_filetypes()
+    if (kind := path.suffix[1:].lower()) not in known:
+        raise ConfigError(f"{path}: '{kind}' is no format of figures; {suggest(kind, known)}")
+    check_target(path)
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format=kind, **options)
 
 
 def field_style(name: str) -> FieldStyle:
@@ -141,6 +173,8 @@ def _draw_field(
 ) -> float:
     """Draw a field with its colour bar; return the end of the colour scale."""
     style = field_style(name)
+    if limit is not None and not (isinstance(limit, int | float | np.number) and 0 < limit < np.inf):
+        raise ConfigError(f"limit = {shown(limit)}: must be a number above zero")
     values = np.linalg.norm(snapshot.velocity, axis=1) if name == "velocity" else getattr(snapshot, name)
     picture, body = _raster(snapshot, values, spacing, extent)
     limit = limit or _limit(picture)
@@ -160,8 +194,13 @@ def _extent(snapshot: Snapshot, spacing: float, view: Sequence[float] | None) ->
     """Return left, right, bottom and top of the view; without one, of the fluid without inlet and outlet buffers."""
     if snapshot.position.shape[1] != 2:
         raise ConfigError("pictures are drawn in 2-D only; open particles.vtkhdf in ParaView")
-    if view:
-        left, right, bottom, top = view
+    if view is not None:
+        try:
+            left, right, bottom, top = map(float, view)
+        except (TypeError, ValueError):
+            left = right = bottom = top = np.nan
+        if not (0 < right - left < LARGEST_VIEW * spacing and 0 < top - bottom < LARGEST_VIEW * spacing):
+            raise ConfigError(f"view = {shown(view)}: needs left, right, bottom and top, in this order [D]")
         return left, right, bottom, top
     position = snapshot.position[snapshot.kind == Kind.FLUID]
     bounds = np.array([position.min(axis=0) - spacing / 2, position.max(axis=0) + spacing / 2])

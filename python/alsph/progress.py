@@ -3,6 +3,7 @@
 import math
 import re
 import time as clock
+from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self
 
@@ -54,7 +55,8 @@ class Reporter:
     ) -> None:
         """Stop the bar."""
         if self._live:
-            self._live.stop()
+            with suppress(OSError, ValueError):  # a terminal that has been closed
+                self._live.stop()
 
     def update(self, rows: dict[str, Any]) -> None:
         """Report new rows of the history; where nobody listens any more, say nothing from then on."""

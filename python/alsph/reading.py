@@ -1,6 +1,7 @@
 """Readers of the files in a run folder; each refuses what it cannot trust with a :class:`RunFolderError`."""
 
 import json
+import math
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,14 +16,24 @@ from numpy.typing import NDArray
 from alsph.durable import viewing
 from alsph.errors import RunFolderError
 from alsph.geometry import FloatArray, Kind
+from alsph.memory import free_memory
+from alsph.text import contents
 
 LARGEST_EXPANSION = 1032
 """Bytes that deflate makes of one byte at most."""
+
+SURFACE_EXPANSION = 20
+"""The same in ``surface.h5``, which alsph does not compress."""
 
 FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
 
 DAMAGE = (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError, OverflowError)
 """What the readers of HDF5 files raise at damaged ones."""
+
+MOST_BYTES = 2**26
+"""Of a text file that says what a run is."""
+
+LARGEST_NUMBER = 1e15
 
 SNAPSHOT_FIELDS = ("velocity", "pressure", "velocity_divergence", "vorticity", "kind")
 
@@ -64,6 +75,8 @@ def _refusing(path: Path, *errors: type[Exception]) -> Iterator[None]:
         yield
     except FileNotFoundError:
         raise RunFolderError(f"{path.parent}: {path.name} is missing; is this a run folder of alsph?") from None
+    except MemoryError:
+        raise RunFolderError(f"{path}: larger than the memory that is free") from None
     except errors as error:
         raise RunFolderError(f"{path}: unreadable, truncated or being written ({error})") from None
 
@@ -71,9 +84,9 @@ def _refusing(path: Path, *errors: type[Exception]) -> Iterator[None]:
 def case(path: Path) -> dict[str, Any]:
     """Read ``case.toml``: the parameters by name, the ``run`` table among them."""
     with _refusing(path, OSError, ValueError, RecursionError):
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(contents(path, MOST_BYTES).decode("utf-8-sig"))
     for name in ("resolution", "reynolds"):
-        if not isinstance(content.get(name), (int, float)) or not content[name] > 0:
+        if not isinstance(content.get(name), (int, float)) or not 0 < content[name] < LARGEST_NUMBER:
             raise RunFolderError(f"{path}: {name} is missing or not positive; is this a run folder of alsph?")
     return content
 
@@ -81,7 +94,7 @@ def case(path: Path) -> dict[str, Any]:
 def info(path: Path) -> dict[str, Any]:
     """Read ``run.json``."""
     with _refusing(path, OSError, ValueError, RecursionError):
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(contents(path, MOST_BYTES))
     if not isinstance(content, dict):
         raise RunFolderError(f"{path}: holds no table; is this a run folder of alsph?")
     kinds: dict[str, Any] = {
@@ -127,7 +140,7 @@ def history(path: Path) -> dict[str, FloatArray]:
     if not path.exists():
         return {"time": np.empty(0)}
     with _refusing(path, OSError, UnicodeDecodeError):
-        text = path.read_text(encoding="utf-8")
+        text = contents(path, int(min(free_memory(), LARGEST_NUMBER)) // 10).decode("utf-8")
     header, *lines = text[: text.rfind("\n") + 1].splitlines() or [""]
     names = header.split(",")
     if "time" not in names:
@@ -145,11 +158,12 @@ def _opened(path: Path) -> Iterator[h5py.File]:
             yield file
 
 
-def sound(file: h5py.Group, name: str) -> h5py.Dataset:
+def sound(file: h5py.Group, name: str, expansion: float = LARGEST_EXPANSION) -> h5py.Dataset:
     """Return an array in an HDF5 file if it can be read without harm.
 
     What a header says is believed only as far as the bytes of the file bear it out: an array that is larger than they
-    can be expanded to, lies in another file, or does not consist of plain numbers is refused.
+    can be expanded to (by a factor of `expansion`), lies in another file, or does not consist of plain numbers is
+    refused.
 
     Raises
     ------
@@ -172,9 +186,26 @@ def sound(file: h5py.Group, name: str) -> h5py.Dataset:
     if {filters.get_filter(index)[0] for index in range(filters.get_nfilters())} - FILTERS:
         raise ValueError(f"{name} is compressed in a way that alsph does not use")
     stored = array.id.get_storage_size()
-    if array.size * array.dtype.itemsize > LARGEST_EXPANSION * stored:
+    if array.size * array.dtype.itemsize > expansion * stored:
         raise ValueError(f"{name} claims {array.shape} entries, more than its {stored} bytes can hold")
     return array
+
+
+def rows(array: h5py.Dataset, chosen: slice = slice(None)) -> NDArray[Any]:
+    """Read rows of an array, if they fit into the memory that is free as numbers of eight bytes.
+
+    Raises
+    ------
+    RunFolderError
+        If they do not.
+    """
+    count = len(range(*chosen.indices(array.shape[0]))) if array.ndim else 1
+    size, free = count * math.prod(array.shape[1:]) * max(8, array.dtype.itemsize), free_memory()
+    if size > free:
+        raise RunFolderError(
+            f"{array.file.filename}: {array.name} takes {size / 2**30:.1f} GiB of memory, {free / 2**30:.1f} are free"
+        )
+    return np.asarray(array[chosen])
 
 
 def surface(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -183,7 +214,7 @@ def surface(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
         return np.empty(0), np.empty(0), np.empty((0, 0))
     with _opened(path) as file:
         names = ("angle", "time", "pressure_coefficient")
-        angle, time, samples = (np.asarray(sound(file, name), float) for name in names)
+        angle, time, samples = (np.asarray(rows(sound(file, name, SURFACE_EXPANSION)), float) for name in names)
         if angle.ndim != 1 or time.ndim != 1 or samples.ndim != 2 or samples.shape[1] != len(angle):
             raise ValueError(f"shapes {angle.shape}, {time.shape}, {samples.shape} do not match")
     count = min(len(time), len(samples))
@@ -195,7 +226,8 @@ def snapshot_times(path: Path) -> FloatArray:
     if not path.exists():
         return np.empty(0)
     with _opened(path) as file:
-        return np.asarray(sound(file, "VTKHDF/Steps/Values")[: file["VTKHDF/Steps"].attrs["NSteps"]], float)
+        times = rows(sound(file, "VTKHDF/Steps/Values"), slice(int(file["VTKHDF/Steps"].attrs["NSteps"])))
+        return np.asarray(times, float)
 
 
 def snapshot(path: Path, step: int) -> Snapshot:
@@ -204,10 +236,10 @@ def snapshot(path: Path, step: int) -> Snapshot:
         root = file["VTKHDF"]
         part = int(sound(root, "Steps/PartOffsets")[step])
         first = int(sound(root, "Steps/PointOffsets")[step])
-        rows = slice(first, first + int(sound(root, "NumberOfPoints")[part]))
-        position = np.asarray(sound(root, "Points")[rows], float)
-        fields = {name: np.asarray(sound(root, f"PointData/{name}")[rows], float) for name in SNAPSHOT_FIELDS}
-        if not len(position) == rows.stop - rows.start > 0:
+        own = slice(first, first + int(sound(root, "NumberOfPoints")[part]))
+        position = np.asarray(rows(sound(root, "Points"), own), float)
+        fields = {name: np.asarray(rows(sound(root, f"PointData/{name}"), own), float) for name in SNAPSHOT_FIELDS}
+        if not len(position) == own.stop - own.start > 0:
             raise ValueError(f"snapshot {step} is incomplete")
         time = float(sound(root, "Steps/Values")[step])
     dimensions = 3 if fields["vorticity"].ndim == 2 else 2

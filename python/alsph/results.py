@@ -1,6 +1,7 @@
 """What a run folder tells: forces, Strouhal number, pressure coefficient, divergence, snapshots and figures."""
 
 import html
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,11 +16,13 @@ from alsph.analysis import Estimate, Window
 from alsph.config import Config
 from alsph.errors import ConfigError, RunFolderError
 from alsph.geometry import FloatArray
-from alsph.io import RunFolder
+from alsph.io import AXES, RunFolder
 from alsph.ledger import Ledger
 from alsph.measures import Measure, Profile
+from alsph.parameters import choose
 from alsph.progress import duration
 from alsph.reading import Snapshot
+from alsph.text import in_figure, printable, shown
 
 
 @dataclass(frozen=True)
@@ -101,10 +104,27 @@ class Run:
             raise RunFolderError(f"{self.path}: no such run folder")
         self.case: dict[str, Any] = reading.case(self.path / "case.toml")
         self.info: dict[str, Any] = reading.info(self.path / "run.json")
+        if self._goes_on() and RunFolder(self.path).is_busy() is False:
+            self.info = reading.info(self.path / "run.json")  # it may just have ended
+            if self._goes_on():
+                self.info |= {"status": "stopped", "message": self._how_to_go_on()}
+
+    def _goes_on(self) -> bool:
+        return self.info.get("status") in ("starting", "running")
+
+    def _how_to_go_on(self) -> str:
+        """Return what to say of a run that has neither ended nor a process at work in it."""
+        resumable = RunFolder(self.path).has_checkpoint()
+        command = f"alsph resume {shlex.quote(str(self.path))}" if resumable else "alsph run, with --force"
+        return f"no process is at work in it, it was killed or its machine went down; go on with: {command}"
 
     @property
     def status(self) -> str:
-        """``running``, ``finished``, ``interrupted``, ``diverged`` or ``failed``."""
+        """How far the run is.
+
+        ``running`` (``starting`` before its first step), ``finished``, ``interrupted``, ``diverged``, ``failed``, or
+        ``stopped``: killed, with no process at work in it.
+        """
         return str(self.info.get("status", "unknown"))
 
     @property
@@ -162,8 +182,19 @@ class Run:
         Returns
         -------
         ndarray, shape (steps,)
-            NaN if there is no such body.
+            NaN if the run has no body.
+
+        Raises
+        ------
+        ConfigError
+            If there is no such direction, part or body.
         """
+        axes = [name for name in AXES if name != "z" or self.config.case.space_dimensions == 3]
+        if axis not in axes:
+            raise ConfigError(f"axis = {shown(axis)}: unknown; known: {', '.join(axes)}; the drag is x and the lift y")
+        choose("part", part, ("total", "pressure", "viscous"))
+        if body is not None:
+            choose("body", body, self.bodies or [known["name"] for known in self.config.case.bodies()])
         names = [body] if body else self.config.case.coefficient_bodies or self.bodies[:1] or [""]
         parts = ("pressure", "viscous") if part == "total" else (part,)
         columns = [self.history.get(f"{name}_{each}_force_{axis}") for each in parts for name in names]
@@ -234,12 +265,12 @@ class Run:
         Raises
         ------
         ConfigError
-            If the time is no number.
+            If the time is no finite number.
         RunFolderError
             If there is no complete snapshot.
         """
-        if time is not None and not np.isfinite(time):
-            raise ConfigError(f"time = {time}: must be a finite number")
+        if time is not None and not (isinstance(time, int | float | np.number) and np.isfinite(time)):
+            raise ConfigError(f"time = {shown(time)}: must be a finite number")
         if len(self.times) == 0:
             raise RunFolderError(f"{self.path}: no snapshot yet; wait for the first one or lower output_interval")
         index = len(self.times) - 1 if time is None else int(np.abs(self.times - time).argmin())
@@ -260,6 +291,11 @@ class Run:
         """
         times = self.times[(self.times >= self.window.start) & (self.times <= self.window.end)]
         box = np.array(lower, dtype=float), np.array(upper, dtype=float)
+        dimensions = self.config.case.space_dimensions
+        if not box[0].shape == box[1].shape == (dimensions,) or not np.all(box[0] < box[1]):
+            raise ConfigError(
+                f"box from {shown(lower)} to {shown(upper)}: needs corners of {dimensions} numbers, the lower one first"
+            )
         if len(times) < 2:
             return np.full(len(lower), np.nan)
         balances = [self._box_balance(self.snapshot(time), box) for time in times]
@@ -314,7 +350,7 @@ class Run:
 
     def plot_spectrum(self, path: str | Path | None = None, body: str | None = None) -> Figure:
         """Figure of the spectra of drag and lift in the averaging window; saved if `path` is given."""
-        return _saved(plotting.spectrum({self.path.name: self}, body), path)
+        return _saved(plotting.spectrum({in_figure(self.path.name): self}, body), path)
 
     def plot_field(
         self,
@@ -339,6 +375,7 @@ class Run:
         view : (left, right, bottom, top), optional
             Part of the plane to show [D]; all of it if None.
         """
+        plotting.field_style(name)
         return _saved(plotting.field(self.snapshot(time), name, self.spacing, limit=limit, view=view), path)
 
     def plot_pressure_coefficient(
@@ -361,14 +398,14 @@ class Run:
         """Name the folder, the case, the status and the time reached."""
         time = self.history["time"]
         reached = time[-1] if len(time) else 0.0
-        return f"Run('{self.path}': {self.case.get('case', 'unknown')}, {self.status}, tU/D = {reached:.4g})"
+        return printable(f"Run('{self.path}': {self.case.get('case', 'unknown')}, {self.status}, tU/D = {reached:.4g})")
 
     def _repr_html_(self) -> str:
-        rows = ((html.escape(name), html.escape(str(value))) for name, value in self.summary().items())
+        rows = ((html.escape(name), html.escape(printable(str(value)))) for name, value in self.summary().items())
         return "<table>" + "".join(f"<tr><th>{name}</th><td>{value}</td></tr>" for name, value in rows) + "</table>"
 
 
 def _saved(figure: Figure, path: str | Path | None) -> Figure:
     if path is not None:
-        figure.savefig(path)
+        plotting.save(figure, path)
     return figure

@@ -68,12 +68,13 @@ class Control:
 def start(config: Config, path: Path, control: Control | None = None, *, force: bool = False) -> Run:
     """Run a case from its start in a new run folder: :meth:`alsph.cases.Case.run`."""
     control, folder = control or Control(), RunFolder(path)
-    folder.check_new(force=force)
+    folder.check_new(force=force, configuration=config)
     simulation = config.case.simulation(config.run.threads, config.run.initial_run)
     remarks, info = beginning.of(config)
     with folder.claimed():
-        folder.check_new(force=force)  # another process may have been faster
+        folder.check_new(force=force, configuration=config)  # another process may have been faster
         folder.create(config, 3 * size_of(simulation.problem.state))
+        folder.announce(config)
         for remark in remarks:
             folder.log(f"warning: {remark}")
         if isinstance(outline := getattr(config.case, "shape", None), Outline):
@@ -158,6 +159,9 @@ def _resume(folder: RunFolder, until: float | None, threads: int | None, control
         if not isinstance(saved.state["time"], float):
             raise RunFolderError(f"{folder.path}: its checkpoint is of no time")
         if saved.state["time"] >= config.until:
+            if until is not None:
+                reached = f"the run has reached t* = {saved.state['time']:.6g}, and until = {until:g}"
+                warnings.warn(f"{folder.path}: nothing to be done: {reached}", RuntimeWarning, stacklevel=3)
             if info.get("status") != "finished" and saved.state["time"] >= own_end:  # cut after its last step
                 folder.write_info(info | {"status": "finished"})
             return Run(folder.path)
@@ -166,6 +170,7 @@ def _resume(folder: RunFolder, until: float | None, threads: int | None, control
             remarks.append("its checkpoint, of an older alsph, does not tell its settings: those in case.toml are used")
         elif changed := _changes(config, saved, folder):
             remarks.append(f"goes on with other settings than before: {', '.join(changed)}")
+        config.case.check_memory(config.run.threads)
         simulation = beginning.restored(config, saved, folder)
         if change := difference(simulation.inflow, saved.inflow):
             remarks.append(f"goes on with {change}")
@@ -419,7 +424,7 @@ class _Driver:
 
 @contextlib.contextmanager
 def _interruptible(event: threading.Event) -> Iterator[list[int]]:
-    """Have Ctrl-C and SIGTERM set an event, so that no write is cut short; gives the signals that have come.
+    """Have Ctrl-C, SIGTERM and SIGHUP set an event, so that no write is cut short; gives the signals that have come.
 
     Another one a second later or more interrupts at once; before, it is an echo from the terminal or a wrapper.
     """
@@ -434,7 +439,10 @@ def _interruptible(event: threading.Event) -> Iterator[list[int]]:
         event.set()
 
     main = threading.current_thread() is threading.main_thread()
-    previous = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGTERM) if main}
+    caught = [signal.SIGINT, signal.SIGTERM]
+    if getattr(signal, "SIGHUP", None) and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # as nohup has it
+        caught.append(signal.SIGHUP)
+    previous = {number: signal.signal(number, handler) for number in caught if main}
     try:
         yield numbers
     finally:

@@ -2,6 +2,9 @@
 
 import json
 import math
+import operator
+import os
+import threading
 import time as clock
 import warnings
 from collections.abc import Iterator
@@ -12,9 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from alsph import _alsph
-from alsph.errors import ConfigError, SolverError
+from alsph.errors import ConfigError, SharedError, SolverError
 from alsph.geometry import FloatArray, Kind, Problem
 from alsph.inflow import Inflow, Prescription, backflow
+from alsph.text import shown
 
 SLICE_SECONDS = 0.2
 """Longest time in the engine without a look at signals, so that Ctrl-C works."""
@@ -32,6 +36,19 @@ def time_step_limits(settings: dict[str, Any], velocity_max: float) -> dict[str,
         return _alsph.time_step_limits(json.dumps(settings), velocity_max)
 
 
+TYPES: dict[str, tuple[type[np.generic], int]] = {
+    "position": (np.float64, 2),
+    "velocity": (np.float64, 2),
+    "pressure": (np.float64, 1),
+    "kind": (np.uint8, 1),
+    "body": (np.uint16, 1),
+    "normal": (np.float64, 2),
+    "depth": (np.float64, 1),
+    "id": (np.uint64, 1),
+}
+"""The arrays of a state: their types and numbers of dimensions."""
+
+
 @contextmanager
 def _translated() -> Iterator[None]:
     try:
@@ -40,6 +57,50 @@ def _translated() -> Iterator[None]:
         raise ConfigError(str(error)) from None
     except _alsph.SolverError as error:
         raise SolverError(str(error)) from None
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":  # that of the engine's edge to Python, which it does not export
+            raise
+        raise SolverError(f"the engine gave up, probably as it was out of memory: {error}") from None
+
+
+def _exact(name: str, values: ArrayLike, kind: type[np.generic], dimensions: int | None = None) -> NDArray[Any]:
+    """Return an array of the type that the engine takes, if that changes no value.
+
+    Raises
+    ------
+    ConfigError
+        If it does, or the array has another number of dimensions.
+    """
+    wanted = "numbers" if kind == np.float64 else f"whole numbers from 0 to {256 ** np.dtype(kind).itemsize - 1}"
+    try:
+        given = np.asarray(values)
+        given = given if given.dtype.kind in "iufb" else np.array(None)
+        with np.errstate(all="ignore"):
+            exact = np.ascontiguousarray(given, kind)
+        if not np.array_equal(given, exact, equal_nan=kind == np.float64):
+            raise ValueError
+    except (TypeError, ValueError):
+        raise ConfigError(f"array `{name}`: must hold {wanted}") from None
+    if dimensions and exact.ndim != dimensions:
+        raise ConfigError(f"array `{name}`: must have {dimensions} dimensions, and has {exact.ndim}")
+    return exact
+
+
+def _whole(name: str, value: Any) -> int:
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise ConfigError(f"{name} = {shown(value)}: must be a whole number") from None
+
+
+def _number(name: str, value: Any) -> float:
+    try:
+        number = math.nan if isinstance(value, str) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if math.isnan(number):
+        raise ConfigError(f"{name} = {shown(value)}: must be a number")
+    return number
 
 
 class Simulation:
@@ -84,37 +145,73 @@ class Simulation:
         self._start(problem.state, threads)
 
     def _start(self, state: dict[str, Any], threads: int | None) -> None:
-        if threads is not None and threads < 1:
-            raise ConfigError(f"threads = {threads}: must be 1 or more")
+        if threads is not None and not (isinstance(threads, int) and threads >= 1):
+            raise ConfigError(f"threads = {shown(threads)}: must be a whole number, 1 or more")
+        exact = {name: _exact(name, state[name], *TYPES[name]) if name in TYPES else state[name] for name in state}
         with _translated():
-            self._engine = _alsph.Simulation(json.dumps(self.problem.settings), state, threads)
+            self._engine_of_process = _alsph.Simulation(json.dumps(self.problem.settings), exact, threads)
+        self._process, self._user = os.getpid(), threading.RLock()
         inlet = np.asarray(state["kind"]) == Kind.INLET
         self._check_inflow(np.asarray(state["position"])[inlet], np.asarray(state["velocity"])[inlet])
 
+    @contextmanager
+    def _engine(self) -> Iterator[_alsph.Simulation]:
+        """Give the engine to one thread at a time, of the process whose threads it steps with.
+
+        Raises
+        ------
+        SharedError
+            If another thread has it, or the process is a forked one, which has none of those threads.
+        """
+        if os.getpid() != self._process:
+            raise SharedError(
+                f"this simulation was made in process {self._process}, whose threads the forked process {os.getpid()} "
+                "does not have; make the simulation there"
+            )
+        if not self._user.acquire(blocking=False):
+            raise SharedError(
+                "this simulation is in use by another thread; let one thread at a time use it, or make two"
+            )
+        try:
+            with _translated():
+                yield self._engine_of_process
+        except SolverError as error:
+            if not self.backflow:
+                raise
+            raise SolverError(f"{error}; before, {self.backflow}") from None
+        finally:
+            self._user.release()
+
     def __repr__(self) -> str:
         """Name the time, the step and the particles."""
+        if os.getpid() != self._process:
+            return f"Simulation(of process {self._process})"
         particles = ", ".join(f"{count} {kind}" for kind, count in self.counts.items() if count)
         return f"Simulation(t* = {self.time:.4g}, step {self.step}: {particles})"
 
     @property
     def time(self) -> float:
         """Time reached [D/U]."""
-        return self._engine.time
+        with self._engine() as engine:
+            return engine.time
 
     @property
     def step(self) -> int:
         """Number of steps taken."""
-        return self._engine.step
+        with self._engine() as engine:
+            return engine.step
 
     @property
     def threads(self) -> int:
         """Number of threads."""
-        return self._engine.threads
+        with self._engine() as engine:
+            return engine.threads
 
     @property
     def counts(self) -> dict[str, int]:
         """Number of particles by kind: ``fluid``, ``inlet``, ``outlet``, ``solid``."""
-        return self._engine.counts
+        with self._engine() as engine:
+            return engine.counts
 
     def advance(self, steps: int = 1, wall_seconds: float = math.inf) -> int:
         """Take up to `steps` steps, stop early after `wall_seconds`, and return the number taken.
@@ -124,14 +221,15 @@ class Simulation:
         SolverError
             If the computation breaks down.
         """
-        first = self.step
-        for seconds in _slices(wall_seconds):
-            left = first + steps - self.step
-            if left <= 0:
-                break
-            with self._stepping():
-                self._engine.advance(self._prescribe(left), seconds)
-        return self.step - first
+        steps = _whole("steps", steps)
+        with self._engine() as engine:
+            first = engine.step
+            for seconds in _slices(wall_seconds):
+                left = first + steps - engine.step
+                if left <= 0:
+                    break
+                engine.advance(self._prescribe(left), seconds)
+            return engine.step - first
 
     def run_until(self, time: float, wall_seconds: float = math.inf) -> bool:
         """Step until ``self.time >= time`` (True) or `wall_seconds` have passed (False).
@@ -143,15 +241,16 @@ class Simulation:
         SolverError
             If the computation breaks down.
         """
-        for seconds in _slices(wall_seconds):
-            if self.time >= time:
-                break
-            with self._stepping():
+        time = _number("time", time)
+        with self._engine() as engine:
+            for seconds in _slices(wall_seconds):
+                if engine.time >= time:
+                    break
                 if self._prescribe(2) == 1:
-                    self._engine.advance(1)
+                    engine.advance(1)
                 else:
-                    self._engine.advance_until(time, seconds)
-        return self.time >= time
+                    engine.advance_until(time, seconds)
+            return engine.time >= time
 
     def steps(self, every: float, until: float | None = None) -> Iterator[dict[str, NDArray[Any]]]:
         """Step to the next multiple of `every` [D/U], yield a :meth:`snapshot`, and so on until `until`."""
@@ -172,14 +271,16 @@ class Simulation:
             ``body``, ``depth``, ``id`` (n,) and ``vorticity``, (n,) in 2-D and (n, 3) in 3-D; and the numbers ``time``,
             ``step``, ``mass_in``, ``mass_out`` and ``next_id``.
         """
-        return self._engine.snapshot()
+        with self._engine() as engine:
+            return engine.snapshot()
 
     def breakdown(self) -> list[tuple[float, dict[str, NDArray[Any]]]]:
         """Return time and particles, as :meth:`snapshot` does, before and after the step that broke down.
 
         Those after it are at the positions before it. If no step has broken down, the present ones are all.
         """
-        before, after = self.snapshot(), self._engine.failed_snapshot()
+        with self._engine() as engine:
+            before, after = engine.snapshot(), engine.failed_snapshot()
         return [(self.time, before)] + ([] if after is None else [(math.nextafter(self.time, math.inf), after)])
 
     def history(self) -> dict[str, NDArray[Any]]:
@@ -201,7 +302,8 @@ class Simulation:
 
         Unless they are to be kept for :meth:`history`, which takes memory as long as the simulation lives.
         """
-        rows = self._engine.take_history()
+        with self._engine() as engine:
+            rows = engine.take_history()
         rows = {"step": rows["step"], **rows, **self._coefficients(rows)}
         if keep and len(rows["step"]):
             self._history.append(rows)
@@ -225,12 +327,13 @@ class Simulation:
 
     def sample(self, points: FloatArray) -> dict[str, FloatArray]:
         """Return the fluid's ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d); NaN far from all fluid."""
-        with _translated():
-            return self._engine.sample(np.ascontiguousarray(points, float))
+        with self._engine() as engine:
+            return engine.sample(_exact("points", points, np.float64, 2))
 
     def inflow_position(self) -> FloatArray:
         """Return the positions (m, d) of the inlet particles."""
-        return self._engine.inflow_position()
+        with self._engine() as engine:
+            return engine.inflow_position()
 
     def set_inflow(self, velocity: ArrayLike | Inflow) -> None:
         """Prescribe the velocity of the inlet particles.
@@ -266,12 +369,9 @@ class Simulation:
 
     def _apply(self, velocity: ArrayLike, position: FloatArray) -> FloatArray:
         """Give the inlet particles at `position` (m, d) a velocity, (d,) or (m, d), and return it as (m, d)."""
-        try:
-            values = np.ascontiguousarray(velocity, float)
-        except (TypeError, ValueError) as error:
-            raise ConfigError(f"inflow: must be an array of numbers, one velocity or one a particle: {error}") from None
-        with _translated():
-            self._engine.set_inflow(values)  # refuses wrong shapes
+        values = _exact("inflow velocity", velocity, np.float64)
+        with self._engine() as engine:
+            engine.set_inflow(values)  # refuses wrong shapes
         every = np.broadcast_to(values, position.shape)
         self._check_inflow(position, every)
         return every
@@ -283,20 +383,10 @@ class Simulation:
             self.backflow = warning
             warnings.warn(warning, RuntimeWarning, stacklevel=4)
 
-    @contextmanager
-    def _stepping(self) -> Iterator[None]:
-        """Translate the engine's errors; a breakdown after backflow tells of that."""
-        try:
-            with _translated():
-                yield
-        except SolverError as error:
-            if not self.backflow:
-                raise
-            raise SolverError(f"{error}; before, {self.backflow}") from None
-
     def state(self) -> dict[str, Any]:
         """Return all that :meth:`restore` needs to go on from here to the last bit (an inflow function excepted)."""
-        return self._engine.state()
+        with self._engine() as engine:
+            return engine.state()
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go back to a state that :meth:`state` has returned; the history starts anew."""

@@ -12,6 +12,7 @@ from rich.console import Console
 
 from alsph import analysis, cases, plotting
 from alsph.config import Config, RunSettings
+from alsph.durable import write_text
 from alsph.errors import ConfigError, SolverError
 from alsph.measures import Measure
 from alsph.progress import duration
@@ -256,7 +257,7 @@ def validate(
         rows = _judge(entry, runs)
         report.rows.extend(rows)
         report.figures.update(_draw(entry, runs, rows, report.path))
-        (report.path / "report.md").write_text(report.to_markdown(), encoding="utf-8")
+        write_text(report.path / "report.md", report.to_markdown())
     return report
 
 
@@ -330,6 +331,6 @@ def _draw(entry: Entry, runs: list[Run], rows: list[Row], path: Path) -> dict[st
         figures["convergence"] = plotting.convergence(errors)
     titles = {}
     for name, figure in figures.items():
-        figure.savefig(path / f"{entry.file_name}_{name}.png")
+        plotting.save(figure, path / f"{entry.file_name}_{name}.png")
         titles[f"{entry.file_name}_{name}.png"] = ", ".join([entry.case, *entry.settings, name.replace("_", " ")])
     return titles

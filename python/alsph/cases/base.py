@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import warnings
 from abc import abstractmethod
 from pathlib import Path
@@ -16,6 +15,7 @@ from pydantic import Field
 from alsph.errors import ConfigError
 from alsph.geometry import FloatArray, Kind, Problem
 from alsph.measures import Measure, Profile
+from alsph.memory import check
 from alsph.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -44,6 +44,8 @@ class Case(Parameters):
     """Parameters that the particles are made for beside what the engine's settings tell: no run changes them."""
     of_the_start: ClassVar[tuple[str, ...]] = ()
     """Parameters of the case that nothing but its own start depends on."""
+    later_names: ClassVar[tuple[str, ...]] = ()
+    """Measures and profiles, or beginnings of their names, that only a run with some results has."""
 
     reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, ge=8, description="particles per reference length, D/Δx [-]")
@@ -225,21 +227,31 @@ class Case(Parameters):
             "bodies": self.bodies(),
         }
 
-    def build(self) -> Problem:
+    def build(self, threads: int | None = None) -> Problem:
         """Return the problem that the engine starts from.
+
+        Parameters
+        ----------
+        threads
+            Number of threads that it will be solved with, which need memory; all cores if None.
 
         Raises
         ------
         ConfigError
             If the particles would not fit into the memory that is free.
         """
-        needed, free = self.memory(), _free_memory()
-        if needed > free:
-            raise ConfigError(
-                f"resolution = {self.resolution}: about {self.particle_estimate():,} particles need "
-                f"{needed / 2**30:.1f} GiB of memory and {free / 2**30:.1f} GiB are free; lower the resolution"
-            )
+        self.check_memory(threads)
         return self.problem(self.particles())
+
+    def check_memory(self, threads: int | None = None) -> None:
+        """Refuse what would not fit into the memory that is free, as :meth:`build` does."""
+        try:
+            particles, memory = self.particle_estimate(), self.memory()
+            check(f"resolution = {self.resolution}", particles, memory / max(particles, 1), threads)
+        except OverflowError:
+            raise ConfigError(
+                f"{self.name}: more particles than can be counted; lower the resolution or the size"
+            ) from None
 
     def problem(self, state: dict[str, Any]) -> Problem:
         """Return this case with the given state, for instance one from a checkpoint."""
@@ -269,7 +281,7 @@ class Case(Parameters):
         from alsph import beginning
         from alsph.results import Run
 
-        problem = self.build()
+        problem = self.build(threads if isinstance(threads, int) else None)
         if initial_run is not None:
             problem = self.problem(beginning.started(self, problem.state, Run(initial_run)))
         if warning := self.time_step_warning():
@@ -393,14 +405,3 @@ class Case(Parameters):
                 f"use {below:.6g} or {above:.6g}"
             )
         return round(cells)
-
-
-def _free_memory() -> float:
-    """Memory that can be had without swapping [bytes]; infinite where the system does not tell."""
-    try:
-        for line in Path("/proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                return float(line.split()[1]) * 1024
-        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (OSError, ValueError):
-        return math.inf

@@ -34,6 +34,10 @@ class Cylinder(Channel):
     name: ClassVar[str] = "cylinder"
     title: ClassVar[str] = "flow past a circular cylinder in a channel"
     body_name: ClassVar[str] = "cylinder"
+    later_names: ClassVar[tuple[str, ...]] = (
+        "largest error of the pressure coefficient beyond 10 degrees",
+        "pressure coefficient",
+    )
 
     def solids(self) -> list[Solid]:
         """Return concentric rings."""

@@ -27,6 +27,7 @@ class Plates(Case):
 
     upper_velocity: ClassVar[float]
     source: ClassVar[str]
+    later_names: ClassVar[tuple[str, ...]] = ("velocity at tU/D = ",)
 
     reynolds: float = Field(default=10.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=40, ge=8, description="particles between the plates, D/Δx [-]")

@@ -27,6 +27,7 @@ class TaylorGreen(Case):
     name: ClassVar[str] = "taylor_green"
     title: ClassVar[str] = "decaying Taylor-Green vortices in a periodic box"
     of_the_start: ClassVar[tuple[str, ...]] = ("perturbation", "seed")
+    later_names: ClassVar[tuple[str, ...]] = ("largest error of the kinetic energy over its start",)
 
     resolution: int = Field(default=50, ge=8, description="particles per side of the box, D/Δx [-]")
     dimensions: Literal[2, 3] = Field(default=2, description="number of space dimensions")

@@ -9,7 +9,7 @@ Examples
 
 from alsph.study.declaration import Figure, Point, Published, Study, Sweep, load, shipped
 from alsph.study.execution import run
-from alsph.study.results import Results
+from alsph.study.results import Results, check_names
 from alsph.study.state import State, states
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "State",
     "Study",
     "Sweep",
+    "check_names",
     "load",
     "run",
     "shipped",

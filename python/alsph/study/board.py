@@ -10,10 +10,12 @@ from typing import Self
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
+from rich.text import Text
 
 from alsph.progress import duration
 from alsph.study.declaration import Point, Study
 from alsph.study.state import ENDED, State
+from alsph.text import printable
 
 PLAIN_SECONDS = 60.0
 
@@ -58,7 +60,7 @@ class Board:
 
     def say(self, line: str) -> None:
         """Print a line."""
-        self.console.print(line, markup=False)
+        self.console.print(printable(line), markup=False)
 
     def ended(self, name: str, how: str) -> None:
         """Report the end of a run."""
@@ -83,8 +85,8 @@ class Board:
         table = Table.grid(padding=(0, 2))
         shown = self.points if len(self.points) <= self.console.height - 4 else self._lively(found)
         for point in shown:
-            table.add_row(self._line(point, found[point.name], now))
-        table.add_row(self._total(found, now))
+            table.add_row(Text(printable(self._line(point, found[point.name], now))))
+        table.add_row(Text(printable(self._total(found, now))))
         return table
 
     def _lively(self, found: Mapping[str, State]) -> list[Point]:

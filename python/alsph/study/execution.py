@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from alsph.errors import AlsphError, ConfigError, RunFolderError, WalltimeError
 from alsph.study.board import Board
 from alsph.study.declaration import Point, Study, load
-from alsph.study.results import Results
+from alsph.study.results import Results, check_names
 from alsph.study.state import ENDED, RUNS, State, states
 from alsph.study.worker import perform, stop_request
 
@@ -73,6 +73,8 @@ def run(
     study = study if isinstance(study, Study) else load(study, preset)
     output = Path(output)
     points = study.points()
+    if any(state.status not in ENDED for state in states(points, output).values()):  # else there is nothing to lose
+        check_names(study, points)
     jobs = _jobs(jobs, threads) if scheduler is None else 0
     try:
         (output / RUNS).mkdir(parents=True, exist_ok=True)
@@ -136,6 +138,7 @@ class _LocalPool:
             input=json.dumps(tables),
             capture_output=True,
             text=True,
+            errors="replace",
             start_new_session=True,
         )
         if done.returncode:

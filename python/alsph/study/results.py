@@ -2,9 +2,10 @@
 
 import csv
 import html
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,10 @@ from matplotlib.figure import Figure as Picture
 
 from alsph import plotting
 from alsph.analysis import Estimate
-from alsph.errors import AlsphError
+from alsph.config import Config
+from alsph.durable import check_target, replacing, write_text
+from alsph.errors import AlsphError, ConfigError
+from alsph.io import RunFolder
 from alsph.measures import Profile
 from alsph.parameters import suggest
 from alsph.plotting import Curve
@@ -20,8 +24,54 @@ from alsph.results import Run
 from alsph.study.declaration import Figure, Point, Study, text
 from alsph.study.state import ENDED, RUNS, State, states
 from alsph.tables import markdown
+from alsph.text import in_figure, printable
 
 DIVERGENCE = "mean velocity divergence, |∇·u| D/U"
+OF_ALL_RUNS = (
+    DIVERGENCE,
+    "sum of the velocity divergence, Σ|∇·u| D/U",
+    "shedding periods",
+    "steps",
+    "mean time step, ΔtU/Δx",
+    "mean iterations",
+)
+"""Results that runs of every case have."""
+
+
+def check_names(study: Study, points: Sequence[Point]) -> None:
+    """Refuse a study that collects or draws what none of its runs will have.
+
+    Raises
+    ------
+    ConfigError
+        With the name, where it stands, and what there is.
+    """
+    results, profiles = set(OF_ALL_RUNS), set[str]()
+    kinds = {(point.config.case.name, point.config.case.space_dimensions): point.config for point in points}
+    for config in kinds.values():
+        measures, curves = names(config)
+        results.update(measures)
+        profiles.update(curves)
+    wanted = [("collect", name, results) for name in study.collect]
+    for figure in study.figures:
+        wanted += [(f"figure {figure.name}, y", name, results) for name in figure.curves]
+        wanted += [(f"figure {figure.name}, profile", name, profiles) for name in filter(None, [figure.profile])]
+    for where, name, known in wanted:
+        if name not in known and not name.startswith(tuple(begin for begin in known if begin.endswith("= "))):
+            raise ConfigError(f"{where}: no result '{name}'; {suggest(name, sorted(known))}")
+
+
+def names(config: Config) -> tuple[set[str], set[str]]:
+    """Return the names of the measures and of the profiles that a run of a case has, as an empty run folder tells."""
+    with TemporaryDirectory() as place:
+        folder = RunFolder(Path(place) / "run")
+        folder.create(config)
+        folder.announce(config)
+        run = Run(folder.path)
+        run.config = config
+        measures, profiles = {measure.name for measure in run.measures}, {profile.name for profile in run.profiles}
+    later = set(config.case.later_names)
+    return measures | later, profiles | later
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +144,8 @@ class Results:
         self._save_csv(self.path / "results.csv")
         figures = self.draw()
         for name, figure in figures.items():
-            figure.savefig(self.path / f"{name}.png", dpi=120)
-        (self.path / "results.md").write_text(self.to_markdown([*figures]), encoding="utf-8")
+            plotting.save(figure, self.path / f"{name}.png", dpi=120)
+        write_text(self.path / "results.md", self.to_markdown([*figures]))
 
     def _columns(self) -> list[str]:
         return list(dict.fromkeys(name for row in self.rows for name in row))
@@ -104,7 +154,8 @@ class Results:
         columns = self._columns()
         uncertain = {name for row in self.rows for name, value in row.items() if _uncertainty(value) is not None}
         header = [cell for name in columns for cell in ([name, f"{name}, ±"] if name in uncertain else [name])]
-        with path.open("w", newline="", encoding="utf-8") as file:
+        check_target(path)
+        with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(header)
             for row in self.rows:
@@ -126,7 +177,7 @@ class Results:
         ]
         parts += [f"*{warning}*" for warning in self.warnings]
         parts += [f"![{titles[name]}]({name}.png)\n\n*{titles[name]}*" for name in figures or []]
-        return "\n\n".join(part for part in parts if part) + "\n"
+        return printable("\n\n".join(part for part in parts if part) + "\n", lines=True)
 
     def _table(self) -> str:
         columns = [name for name in self._columns() if name not in ("folder", "seconds")]
@@ -162,9 +213,11 @@ class Results:
 
     def _repr_html_(self) -> str:
         columns = [name for name in self._columns() if name != "folder"]
-        head = "".join(f"<th>{html.escape(name)}</th>" for name in columns)
+        head = "".join(f"<th>{html.escape(printable(name))}</th>" for name in columns)
         body = "".join(
-            "<tr>" + "".join(f"<td>{html.escape(_shown(row.get(name, '')))}</td>" for name in columns) + "</tr>"
+            "<tr>"
+            + "".join(f"<td>{html.escape(printable(_shown(row.get(name, ''))))}</td>" for name in columns)
+            + "</tr>"
             for row in self.rows
         )
         return f"<table><tr>{head}</tr>{body}</table>"
@@ -191,7 +244,7 @@ class Results:
         parts = []
         for name in self.study.swept:
             if name != without and name in row and name in self.study.varied:
-                parts.append(_LEGEND.get(name, "{name} {value}").format(name=name, value=text(row[name])))
+                parts.append(_LEGEND.get(name, "{name} {value}").format(name=name, value=in_figure(text(row[name]))))
         return " ".join(parts)
 
     def _curves(self, figure: Figure) -> Picture | None:
@@ -268,13 +321,16 @@ def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, fl
         run = Run(folder)
         results: dict[str, Any] = {measure.name: measure.value for measure in run.measures}
         known = {measure.name: measure.reference for measure in run.measures if abs(measure.reference) > 0}
-        results[DIVERGENCE] = run.divergence.mean
-        results["sum of the velocity divergence, Σ|∇·u| D/U"] = run.divergence.sum
-        results["shedding periods"] = run.window.periods
-        results["steps"] = len(run.history["time"])
-        results["mean time step, ΔtU/Δx"] = float(np.mean(run.history["time_step"])) / run.spacing
-        results["mean iterations"] = float(np.mean(run.history["iterations"]))
-        return results, known
+        history = run.history
+        numbers = (
+            run.divergence.mean,
+            run.divergence.sum,
+            run.window.periods,
+            len(history["time"]),
+            float(np.mean(history["time_step"])) / run.spacing,
+            float(np.mean(history["iterations"])),
+        )
+        return results | dict(zip(OF_ALL_RUNS, numbers, strict=True)), known
     except (AlsphError, KeyError) as error:
         return {"message": str(error)}, {}
 
@@ -297,7 +353,7 @@ def _is_nan(value: Any) -> bool:
 
 
 def _cell(value: Any) -> str:
-    return repr(float(value)) if isinstance(value, float) else str(value)
+    return repr(float(value)) if isinstance(value, float) else printable(str(value))
 
 
 def _shown(value: Any) -> str:

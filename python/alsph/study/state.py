@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from alsph.errors import RunFolderError
-from alsph.io import RunFolder
+from alsph.io import UNFINISHED, RunFolder
 from alsph.study.declaration import Point
+from alsph.text import printable
 
 ENDED = ("finished", "diverged", "skipped")
 RUNS = "runs"
@@ -56,11 +57,14 @@ def state(path: Path) -> State:
     except RunFolderError as error:
         return State("failed", message=str(error))
     status, time = str(info.get("status", "waiting")), float(info.get("time", 0.0))
+    message = str(info.get("message", ""))
     if folder.is_busy():
         status, time = "running", max(time, _last_time(path / "history.csv"))
-    elif status in ("running", "interrupted"):
+    elif status in UNFINISHED:
+        if status != "interrupted":
+            message = "no process is at work in it; goes on when the study is run again"
         status = "stopped"
-    return State(status, time, float(info.get("seconds", 0.0)), str(info.get("message", "")))
+    return State(printable(status), time, float(info.get("seconds", 0.0)), printable(message))
 
 
 def _last_time(path: Path) -> float:
