@@ -61,6 +61,12 @@ class Body(Channel):
         centred = affinity.translate(outline, -outline.centroid.x, -outline.centroid.y)
         return affinity.rotate(centred, -self.angle_of_attack, origin=(0, 0))
 
+    @property
+    def thickness(self) -> float:
+        """Extent of the body across the stream [D]."""
+        _, bottom, _, top = self.outline.bounds
+        return float(top - bottom)
+
     def solid(self) -> Solid:
         """Return layers along the surface."""
         return body_layers(self.outline, self.particle_spacing, self.support_layers)

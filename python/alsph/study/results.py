@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure as Picture
 
 from alsph import plotting
-from alsph.analysis import Estimate
+from alsph.analysis import Estimate, remark
 from alsph.errors import AlsphError
 from alsph.measures import Profile
 from alsph.parameters import suggest
@@ -20,6 +20,7 @@ from alsph.results import Run
 from alsph.study.declaration import Figure, Point, Study, text
 from alsph.study.state import ENDED, RUNS, State, states
 from alsph.tables import markdown
+from alsph.window import DEVELOPING
 
 DIVERGENCE = "mean velocity divergence, |∇·u| D/U"
 
@@ -207,6 +208,9 @@ class Results:
                 if y in self.references[index]:
                     known[row[figure.x]] = self.references[index][y]
             curves = [Curve(name, *_sorted(points)) for name, points in series.items()]
+            early = [point for points in series.values() for point in points if remark(point[1])]
+            if early:
+                curves.append(Curve(DEVELOPING, *_sorted(early)[:2], style="rx"))
             if known:
                 curves.append(Curve("reference", *_sorted(list(known.items())), style="k--"))
             curves += [
@@ -271,6 +275,7 @@ def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, fl
         results[DIVERGENCE] = run.divergence.mean
         results["sum of the velocity divergence, Σ|∇·u| D/U"] = run.divergence.sum
         results["shedding periods"] = run.window.periods
+        results["averaging rule"] = run.window.rule
         results["steps"] = len(run.history["time"])
         results["mean time step, ΔtU/Δx"] = float(np.mean(run.history["time_step"])) / run.spacing
         results["mean iterations"] = float(np.mean(run.history["iterations"]))
@@ -285,11 +290,12 @@ def _sorted(points: list[tuple[Any, Any]]) -> tuple[list[float], list[float], li
         points = [(str(x), y) for x, y in points]
     else:
         points = sorted(points, key=lambda point: point[0])
-    return [x for x, _ in points], [float(y) for _, y in points], [_uncertainty(y) or 0.0 for _, y in points]
+    bars = [_uncertainty(y) or 0.0 for _, y in points]
+    return [x for x, _ in points], [float(y) for _, y in points], [bar if np.isfinite(bar) else 0.0 for bar in bars]
 
 
 def _uncertainty(value: Any) -> float | None:
-    return value.uncertainty if isinstance(value, Estimate) and np.isfinite(value.uncertainty) else None
+    return value.uncertainty if isinstance(value, Estimate) and not np.isnan(value.uncertainty) else None
 
 
 def _is_nan(value: Any) -> bool:
