@@ -32,6 +32,14 @@ def batch_means(time: FloatArray, values: FloatArray, edges: FloatArray) -> Floa
     return np.asarray(np.diff(at_edges, axis=0) / widths)
 
 
+def smoothed(time: FloatArray, signal: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
+    """Return the times half a width or more from both ends, and the averages of the signal over a width about them."""
+    inside = time[(time >= time[0] + width / 2) & (time <= time[-1] - width / 2)]
+    integral = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(time) * (signal[1:] + signal[:-1]))])
+    after, before = (np.interp(inside + half, time, integral) for half in (width / 2, -width / 2))
+    return inside, (after - before) / width
+
+
 def upward_crossings(time: FloatArray, signal: FloatArray, dead_band: float = 0.0) -> FloatArray:
     """Return the times at which a signal rises from below ``-dead_band`` to above ``dead_band``.
 

@@ -18,7 +18,8 @@ LEAST = 4  # averages, fewer of which tell neither their correlation nor a trend
 CORRELATIONS = np.linspace(-0.9, 0.975, 76)  # of an average with the next
 RELAXATION_TIMES = np.geomspace(0.1, 4.0, 50)  # over the length of the window; slower ones cannot be told from no end
 EXTRAPOLATION = 0.25  # relative standard error of a relaxation's rest, since none is exactly exponential
-TREND = 2.5  # a slope of so many of its standard errors is a trend
+TREND = 3.0  # a slope of so many of its standard errors is a trend
+BEND = 0.2  # time over the length of the window in which a trend that is no line changes
 GROWTH = 0.95  # probability from which a trend is held to gather pace
 
 
@@ -32,7 +33,7 @@ class Uncertainty:
         Standard uncertainty (68 %) of the mean of the averages as an estimate of the settled mean; infinite if there
         is no telling.
     change : float
-        Change from the first to the last average by the straight line through them if that is a trend, else 0.
+        Change from the first to the last average by the line through them that fits best if that is a trend, else 0.
     """
 
     standard: float
@@ -67,21 +68,26 @@ def uncertainty_of_mean(averages: FloatArray, value: float) -> Uncertainty:
 
 
 def trend(averages: FloatArray) -> float:
-    """Return the change from the first to the last average by a straight line if it is significant, else 0.
+    """Return the change from the first to the last average by a straight line or a bend if it is significant, else 0.
 
-    The standard error of the slope is that of independent deviations from the line, times what their correlation with
-    the next one adds, √((1+r)/(1-r)).
+    The bends are exponentials that change most at the begin or at the end. The standard error of a slope is that of
+    independent deviations from the line, times what their correlation with the next one adds, √((1+r)/(1-r)).
     """
     count = len(averages)
     if count < LEAST:
         return 0.0
-    index = np.arange(count) - 0.5 * (count - 1)
-    slope = index @ averages / (index @ index)
-    rest = averages - averages.mean() - slope * index
-    variance = rest @ rest / (count - 2)
-    correlation = np.clip((rest[1:] @ rest[:-1]) / (rest @ rest or 1.0), 0.0, 0.9)
-    error = np.sqrt(variance / (index @ index) * (1 + correlation) / (1 - correlation))
-    return float(slope * (count - 1)) if abs(slope) > TREND * error else 0.0
+    time = np.arange(count) / (count - 1)
+    shapes = np.stack([time, 1 - np.exp(-time / BEND), np.exp((time - 1) / BEND)])
+    centred, deviations = shapes - shapes.mean(axis=1)[:, None], averages - averages.mean()
+    squares = (centred**2).sum(axis=1)
+    slope = centred @ deviations / squares
+    rest = deviations - slope[:, None] * centred
+    residual = np.maximum((rest**2).sum(axis=1), np.finfo(float).tiny)
+    correlation = np.clip((rest[:, 1:] * rest[:, :-1]).sum(axis=1) / residual, 0.0, 0.9)
+    error = np.sqrt(residual / (count - 2) / squares * (1 + correlation) / (1 - correlation))
+    best = int(np.argmax(np.abs(slope) / error))
+    change = slope[best] * (shapes[best, -1] - shapes[best, 0])
+    return float(change) if abs(slope[best]) > TREND * error[best] else 0.0
 
 
 def _correlated(averages: FloatArray, value: float) -> float:

@@ -6,15 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alsph.geometry import FloatArray
-from alsph.signals import amplitude_spectrum, batch_means, cycle_amplitudes, upward_crossings
+from alsph.signals import amplitude_spectrum, batch_means, cycle_amplitudes, smoothed, upward_crossings
 from alsph.uncertainty import uncertainty_of_mean
 
 AMPLITUDE_TOLERANCE = (0.02, 0.05)  # relative bounds on how far a settled cycle's lift amplitude is from the reference
 DRAG_TOLERANCE = (0.01, 0.02)  # and on its mean drag
 SETTLED_CYCLES = 3  # so many settled cycles in a row end the transient; fewer oscillations in all are no shedding yet
 IRREGULAR_PERIODS = 0.25  # relative scatter of the periods above which crossings are noise, not shedding
+SMOOTHING = 0.125  # of a period, before crossings are sought
 DEAD_BAND = 0.3  # crossings are counted between excursions of at least this times the lift's rms
 BATCHES_WITHOUT_CYCLES = 20
+TOO_FEW = f"fewer than {SETTLED_CYCLES} oscillations of the lift"
+SLOW_LIFT = 0.01  # rms of so few oscillations, over that of the whole force, that is shedding to come
 DEVELOPING = "still developing"
 DRIFT_TOLERANCE = 0.005  # a trend matters if the settled mean may be farther than this from the mean, over the rms
 SMALLEST_LIFT = 1e-3  # rms of the lift's fluctuation over the drag's rms below which it is round-off or noise
@@ -85,16 +88,24 @@ def averaging_window(time: FloatArray, drag: FloatArray, lift: FloatArray, thick
     if doubt:
         return _without_shedding(time, drag, lift, doubt)
     first = _first_settled_cycle(time, drag, lift, edges)
-    rule = "periodic: whole shedding periods after the transient"
     if first is None:
-        first, settled = (len(edges) - 1) // 2, False
         rule = "shedding not periodic yet: later half of the shedding periods"
-    else:
-        settled = True
-    edges = edges[first:]
+        return _whole_periods(time, drag, lift, edges[(len(edges) - 1) // 2 :], rule, settled=False)
+    rule = "periodic: whole shedding periods after the transient"
+    rest = (len(edges) - 1 - first) // 8  # what is left of the transient is a trend, too, which a later start cures
+    windows = [_whole_periods(time, drag, lift, edges[k:], rule, settled=True) for k in range(first, first + rest + 1)]
+    return next((window for window in windows if not window.developing), windows[0])
+
+
+def _whole_periods(
+    time: FloatArray, drag: FloatArray, lift: FloatArray, edges: FloatArray, rule: str, *, settled: bool
+) -> Window:
+    """Return the window of these shedding periods, with what develops in it."""
     amplitudes = cycle_amplitudes(time, lift, edges)
-    trends = {"drag": _drift(time, drag, edges), "lift amplitude": drift_of(amplitudes, float(amplitudes.mean()))}
-    growing = bool(np.isinf(uncertainty_of_mean(amplitudes, float(amplitudes.mean())).standard)) and len(amplitudes) > 3
+    average = float(amplitudes.mean())
+    growth = uncertainty_of_mean(amplitudes, average)
+    trends = {"drag": _drift(time, drag, edges), "lift amplitude": drift_of(amplitudes, average)}
+    growing = growth.change > 0 and bool(np.isinf(growth.standard))
     return Window(edges, len(edges) - 1, settled, with_trends(rule, trends), growing)
 
 
@@ -104,11 +115,16 @@ def _without_shedding(time: FloatArray, drag: FloatArray, lift: FloatArray, doub
     if np.isnan(lift).all():
         return Window(edges, 0, False, "later half of the record")
     rule = f"no regular shedding found: {doubt}; later half of the record"
-    slices = edges[:: BATCHES_WITHOUT_CYCLES // 5]
-    fluctuation = np.sqrt(batch_means(time, (lift - batch_means(time, lift, edges[[0, -1]])) ** 2, slices))
-    growth = uncertainty_of_mean(fluctuation, float(fluctuation.mean()))
+    whole = edges[[0, -1]]
+    scale = float(np.sqrt(batch_means(time, drag**2 + lift**2, whole)[0]))
+    fluctuation = (lift - batch_means(time, lift, whole)) ** 2
+    fifths = np.sqrt(batch_means(time, fluctuation, edges[:: BATCHES_WITHOUT_CYCLES // 5]))
+    growth = uncertainty_of_mean(fifths, float(fifths.mean()))
     growing = growth.change > 0 and bool(np.isinf(growth.standard))
     trends = {"drag": _drift(time, drag, edges), "lift": "grows" if growing else _drift(time, lift, edges)}
+    if doubt == TOO_FEW and np.sqrt((fifths**2).mean()) > SLOW_LIFT * scale:
+        trends["shedding"] = "may have begun"
+        growing = growing or bool(fifths[3:].mean() > 1.5 * fifths[:2].mean())
     return Window(edges, 0, False, with_trends(rule, trends), growing)
 
 
@@ -142,12 +158,12 @@ def _shedding(time: FloatArray, drag: FloatArray, lift: FloatArray, thickness: f
     spread = float(lift[late].std())
     if not spread > SMALLEST_LIFT * float(np.sqrt((drag[late] ** 2).mean())):
         return none, f"the lift fluctuates by less than {SMALLEST_LIFT:g} of the drag"
-    edges = upward_crossings(time, lift - lift[late].mean(), DEAD_BAND * spread)
+    edges = _rises(time, lift - lift[late].mean(), DEAD_BAND * spread)
     periods = np.diff(edges)[len(edges) // 2 :]
     if len(periods) and periods.std() > IRREGULAR_PERIODS * periods.mean():
         return none, "the lift's oscillations are of irregular length"
     if len(edges) - 1 < SETTLED_CYCLES:
-        return none, f"fewer than {SETTLED_CYCLES} oscillations of the lift"
+        return none, TOO_FEW
     frequency = 1 / float(periods.mean())
     if frequency * thickness > LARGEST_STROUHAL:
         return none, f"the lift oscillates at fD/U = {frequency:.3g}, faster than a wake of this thickness can"
@@ -156,6 +172,13 @@ def _shedding(time: FloatArray, drag: FloatArray, lift: FloatArray, thickness: f
     if _line_share(time, lift, frequency) < LINE_SHARE:
         return none, "no line stands out of the lift's spectrum"
     return edges, ""
+
+
+def _rises(time: FloatArray, fluctuation: FloatArray, dead_band: float) -> FloatArray:
+    """Return the upward zero crossings, without noise much faster than the strongest line of the later half."""
+    frequencies, lines = amplitude_spectrum(time, fluctuation, 0.5 * (time[0] + time[-1]), float(time[-1]))
+    line = float(frequencies[1 + np.argmax(lines[1:])])
+    return upward_crossings(*smoothed(time, fluctuation, SMOOTHING / line), dead_band)
 
 
 def _line_share(time: FloatArray, lift: FloatArray, frequency: float) -> float:
