@@ -9,16 +9,16 @@ standard uncertainty is the distance within which the settled mean lies with the
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtr
+from scipy.special import stdtr, stdtrit
 
 from alsph.geometry import FloatArray
 
 ONE_SIGMA = 0.6827
-LEAST = 4  # averages, fewer of which tell neither their correlation nor a trend
+LEAST = 3  # averages, fewer of which tell neither their correlation nor a trend
 CORRELATIONS = np.linspace(-0.9, 0.975, 76)  # of an average with the next
 RELAXATION_TIMES = np.geomspace(0.1, 4.0, 50)  # over the length of the window; slower ones cannot be told from no end
 EXTRAPOLATION = 0.25  # relative standard error of a relaxation's rest, since none is exactly exponential
-TREND = 3.0  # a slope of so many of its standard errors is a trend
+TREND = 3.0  # a slope of so many of its standard errors is a trend, and of more where they are known from few averages
 BEND = 0.2  # time over the length of the window in which a trend that is no line changes
 GROWTH = 0.95  # probability from which a trend is held to gather pace
 
@@ -55,7 +55,7 @@ def uncertainty_of_mean(averages: FloatArray, value: float) -> Uncertainty:
     Uncertainty
         Infinite for fewer than three averages.
     """
-    if len(averages) < 3:
+    if len(averages) < LEAST:
         return Uncertainty(np.inf)
     scale = max(float(np.abs(averages).max()), np.finfo(float).tiny)
     averages, value = averages / scale, value / scale  # so that weights neither over- nor underflow
@@ -87,7 +87,8 @@ def trend(averages: FloatArray) -> float:
     error = np.sqrt(residual / (count - 2) / squares * (1 + correlation) / (1 - correlation))
     best = int(np.argmax(np.abs(slope) / error))
     change = slope[best] * (shapes[best, -1] - shapes[best, 0])
-    return float(change) if abs(slope[best]) > TREND * error[best] else 0.0
+    least = max(TREND, stdtrit(count - 2, 0.975))
+    return float(change) if abs(slope[best]) > least * error[best] else 0.0
 
 
 def _correlated(averages: FloatArray, value: float) -> float:
@@ -114,7 +115,7 @@ def _relaxing(averages: FloatArray, value: float) -> float:
     centred, deviations = shapes - shape_means[:, None], averages - averages.mean()
     squares = (centred**2).sum(axis=1)
     amplitude = centred @ deviations / squares
-    freedom = len(averages) - 3  # mean, amplitude, time
+    freedom = max(len(averages) - 3, 1)  # mean, amplitude, time
     residual = np.maximum(((deviations - amplitude[:, None] * centred) ** 2).sum(axis=1), 1e-24)
     likelihood = -0.5 * (len(averages) - 2) * np.log(residual) - np.log(np.abs(rates))  # any time as likely as another
     weight = np.exp(likelihood - likelihood.max())
