@@ -198,3 +198,30 @@ def test_what_still_develops_is_said_wherever_it_is_shown(developing):
     assert "still developing" in plotting.spectrum({"a": run}).axes[0].get_legend().get_texts()[0].get_text()
     row = Row(Entry("cylinder", (10,), 13.0), 10, Measure("mean drag coefficient", run.drag.mean, 1.5, 0.02))
     assert row.cells[-1].endswith("(still developing)")
+
+
+@pytest.mark.parametrize("start", [1e-5, 1e-3, 0.02])
+def test_a_lift_that_grows_makes_the_drag_before_it_unknown(start):
+    time = np.arange(0, 25, 0.005)
+    lift = start * np.exp(0.2 * time) * np.sin(2 * np.pi * 0.2 * time)
+    window = analysis.averaging_window(time, 1.2 + 0.1 * lift**2, lift)
+    mean = analysis.mean(time, 1.2 + 0.1 * lift**2, window)
+    assert window.growing and mean.developing and mean.uncertainty == math.inf
+
+
+def test_a_slow_beat_or_a_tiny_drift_leaves_the_mean_known():
+    time = np.arange(0, 60, 0.008)
+    beat = np.sin(2 * np.pi * time / 150 - 2)
+    drag, lift = 1.48 + 0.01 * beat, 0.5 * (1 + 0.02 * beat) * np.sin(0.4 * np.pi * time)
+    mean = analysis.mean(time, drag, analysis.averaging_window(time, drag, lift))
+    assert mean.developing and abs(mean - 1.48) < mean.uncertainty < 0.1
+    drag = 1.48 + 1e-6 * np.exp(time / 30)
+    mean = analysis.mean(time, drag, analysis.averaging_window(time, drag, 0 * time))
+    assert not mean.developing and mean.uncertainty < 1e-3
+
+
+def test_round_off_that_wanders_is_no_development():
+    time = np.arange(0, 40, 0.01)
+    wander = 1e-13 * np.cumsum(np.random.default_rng(0).normal(size=len(time)))
+    window = analysis.averaging_window(time, 1.3 + 0 * time, wander)
+    assert not window.developing and window.periods == 0

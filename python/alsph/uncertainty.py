@@ -21,6 +21,7 @@ EXTRAPOLATION = 0.25  # relative standard error of a relaxation's rest, since no
 TREND = 3.0  # a slope of so many of its standard errors is a trend, and of more where they are known from few averages
 BEND = 0.2  # time over the length of the window in which a trend that is no line changes
 GROWTH = 0.95  # probability from which a trend is held to gather pace
+LARGE_GROWTH = 0.01  # relative change of such a trend from which there is no telling where it ends
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,10 @@ def _correlated(averages: FloatArray, value: float) -> float:
 
 
 def _relaxing(averages: FloatArray, value: float) -> float:
-    """Uncertainty where the averages go exponentially to the settled mean; infinite where they go away from it."""
+    """Uncertainty where the averages, the largest of them 1, go exponentially to the settled mean.
+
+    Infinite where they go away from it, and far.
+    """
     time = (np.arange(len(averages)) + 0.5) / len(averages)
     rates = np.concatenate([-1 / RELAXATION_TIMES, 1 / RELAXATION_TIMES])
     shapes = np.exp(rates[:, None] * (time - (rates[:, None] > 0)))
@@ -119,7 +123,7 @@ def _relaxing(averages: FloatArray, value: float) -> float:
     residual = np.maximum(((deviations - amplitude[:, None] * centred) ** 2).sum(axis=1), 1e-24)
     likelihood = -0.5 * (len(averages) - 2) * np.log(residual) - np.log(np.abs(rates))  # any time as likely as another
     weight = np.exp(likelihood - likelihood.max())
-    if weight[rates > 0].sum() > GROWTH * weight.sum():
+    if np.ptp(averages) > LARGE_GROWTH and weight[rates > 0].sum() > GROWTH * weight.sum():
         return np.inf
     rest = averages.mean() - amplitude * shape_means - value
     variance = residual / freedom * (1 / len(averages) + shape_means**2 / squares)

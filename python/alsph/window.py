@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from alsph.geometry import FloatArray
 from alsph.signals import amplitude_spectrum, batch_means, cycle_amplitudes, smoothed, upward_crossings
-from alsph.uncertainty import uncertainty_of_mean
+from alsph.uncertainty import trend, uncertainty_of_mean
 
 AMPLITUDE_TOLERANCE = (0.02, 0.05)  # relative bounds on how far a settled cycle's lift amplitude is from the reference
 DRAG_TOLERANCE = (0.01, 0.02)  # and on its mean drag
@@ -20,6 +20,9 @@ TOO_FEW = f"fewer than {SETTLED_CYCLES} oscillations of the lift"
 SLOW_LIFT = 0.01  # rms of so few oscillations, over that of the whole force, that is shedding to come
 DEVELOPING = "still developing"
 DRIFT_TOLERANCE = 0.005  # a trend matters if the settled mean may be farther than this from the mean, over the rms
+ROUND_OFF = 1e-9  # no growth of the lift below this share of the force is told
+SMALLEST_CHANGE = 1e-4  # nor a change below this share
+FAST_GROWTH = 0.1  # of the lift's amplitude in the window, beyond which nothing tells the settled flow
 SMALLEST_LIFT = 1e-3  # rms of the lift's fluctuation over the drag's rms below which it is round-off or noise
 LARGEST_STROUHAL = 1.0  # by the thickness across the stream: bluff bodies 0.1 to 0.3, trailing edges and channels more
 SAMPLES_PER_PERIOD = 10
@@ -105,7 +108,7 @@ def _whole_periods(
     average = float(amplitudes.mean())
     growth = uncertainty_of_mean(amplitudes, average)
     trends = {"drag": _drift(time, drag, edges), "lift amplitude": drift_of(amplitudes, average)}
-    growing = growth.change > 0 and bool(np.isinf(growth.standard))
+    growing = growth.change > FAST_GROWTH * average and bool(np.isinf(growth.standard))
     return Window(edges, len(edges) - 1, settled, with_trends(rule, trends), growing)
 
 
@@ -119,9 +122,10 @@ def _without_shedding(time: FloatArray, drag: FloatArray, lift: FloatArray, doub
     scale = float(np.sqrt(batch_means(time, drag**2 + lift**2, whole)[0]))
     fluctuation = (lift - batch_means(time, lift, whole)) ** 2
     fifths = np.sqrt(batch_means(time, fluctuation, edges[:: BATCHES_WITHOUT_CYCLES // 5]))
-    growth = uncertainty_of_mean(fifths, float(fifths.mean()))
-    growing = growth.change > 0 and bool(np.isinf(growth.standard))
-    trends = {"drag": _drift(time, drag, edges), "lift": "grows" if growing else _drift(time, lift, edges)}
+    growing = trend(fifths) > max(0.5 * fifths.max(), ROUND_OFF * scale)
+    trends = {"drag": _drift(time, drag, edges), "lift": drift_of(batch_means(time, lift, edges), scale)}
+    if growing:
+        trends["lift"] = "grows"
     if doubt == TOO_FEW and np.sqrt((fifths**2).mean()) > SLOW_LIFT * scale:
         trends["shedding"] = "may have begun"
         growing = growing or bool(fifths[3:].mean() > 1.5 * fifths[:2].mean())
@@ -143,7 +147,7 @@ def _drift(time: FloatArray, values: FloatArray, edges: FloatArray) -> str:
 def drift_of(averages: FloatArray, scale: float) -> str:
     """Return in words how successive averages drift, empty where they do not or it is little beside the scale."""
     found = uncertainty_of_mean(averages, float(averages.mean()))
-    if not found.change or not found.standard > DRIFT_TOLERANCE * scale:
+    if not abs(found.change) > SMALLEST_CHANGE * scale or not found.standard > DRIFT_TOLERANCE * scale:
         return ""
     gathering = ", gathering pace" if np.isinf(found.standard) else ""
     return f"changes by {found.change / scale:+.1%} over the window{gathering}"
