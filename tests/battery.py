@@ -25,14 +25,18 @@ def transient(time):
     return 4 * np.exp(-time / 0.3) - 0.3 * np.exp(-time / 2)
 
 
+def autoregressive_series(rng, correlation, count):
+    """Return numbers of mean zero and variance one, each correlated with the next as given."""
+    values = rng.normal(size=count)
+    for k in range(1, count):
+        values[k] = correlation * values[k - 1] + np.sqrt(1 - correlation**2) * values[k]
+    return values
+
+
 def autoregressive(rng, time, correlation, spread=0.02):
     """Return noise with values one period apart correlated as given, straight in between."""
     knots = np.arange(0, time[-1] + 2 / STROUHAL, 1 / STROUHAL)
-    values = np.empty(len(knots))
-    values[0] = rng.normal()
-    for k in range(1, len(knots)):
-        values[k] = correlation * values[k - 1] + np.sqrt(1 - correlation**2) * rng.normal()
-    return spread * np.interp(time, knots, values)
+    return spread * np.interp(time, knots, autoregressive_series(rng, correlation, len(knots)))
 
 
 def correlated(correlation):

@@ -16,6 +16,7 @@ from alsph.geometry import FloatArray
 ONE_SIGMA = 0.6827
 LEAST = 3  # averages, fewer of which tell neither their correlation nor a trend
 CORRELATIONS = np.linspace(-0.9, 0.975, 76)  # of an average with the next
+LEAN = 0.75  # correlations are weighed by (1-φ)^-LEAN
 RELAXATION_TIMES = np.geomspace(0.1, 4.0, 50)  # over the length of the window; slower ones cannot be told from no end
 EXTRAPOLATION = 0.25  # relative standard error of a relaxation's rest, since none is exactly exponential
 TREND = 3.0  # a slope of so many of its standard errors is a trend, and of more where they are known from few averages
@@ -96,14 +97,15 @@ def _correlated(averages: FloatArray, value: float) -> float:
     """Uncertainty where each average deviates by a share φ of the deviation before it and by chance.
 
     For a given φ the numbers (y_k+1 - φ y_k)/(1 - φ) are independent and their mean is the settled one, whatever the
-    first average was. φ itself is known from a few averages only roughly: each is weighed by its likelihood and by
-    √(1 - φ), with which the uncertainty is right most nearly for φ = 0 to 0.9 alike (benches/coverage.py).
+    first average was. φ itself is known from a few averages only roughly: each is weighed by its likelihood, and large
+    ones more, by so much that the uncertainty covers the mean in two of three cases for φ = 0 to 0.9 alike
+    (benches/coverage.py).
     """
     phi = CORRELATIONS[:, None]
     settled = (averages[1:] - phi * averages[:-1]) / (1 - phi)
     freedom = len(averages) - 2
     variance = np.maximum(settled.var(axis=1), np.finfo(float).tiny)
-    likelihood = -0.5 * freedom * np.log((1 - CORRELATIONS) ** 2 * variance) - 0.5 * np.log(1 - CORRELATIONS)
+    likelihood = -0.5 * freedom * np.log((1 - CORRELATIONS) ** 2 * variance) - LEAN * np.log(1 - CORRELATIONS)
     return _half_width(settled.mean(axis=1) - value, np.sqrt(variance / freedom), likelihood, freedom)
 
 
