@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
 from alsph import plotting, study
+from alsph.analysis import remark
 from alsph.config import Config
 from alsph.durable import write_text
 from alsph.errors import ConfigError
@@ -82,7 +83,7 @@ def grid_convergence(
     The order p solves (φ₁ − φ₂)/(φ₂ − φ₃) = (r₁₂^p − 1) r₂₃^p / (r₂₃^p − 1) of f = φ + C Δx^p through the last three
     values, from coarse (1) to fine (3): the procedure of Celik et al. (J. Fluids Eng. 130, 078001, 2008), section 2.
     """
-    known = tuple(map(float, resolutions)), tuple(map(float, values))
+    known = tuple(map(float, resolutions)), tuple(values)
     if len(resolutions) < 3 or len(values) != len(resolutions):
         raise ConfigError(f"{name}: needs values at three resolutions or more, and has {len(values)}")
     (n1, n2, n3), (f1, f2, f3) = known[0][-3:], known[1][-3:]
@@ -145,7 +146,7 @@ class Report:
         rows = [
             [
                 found.name,
-                *(f"{value:.5g}" for value in found.values),
+                *(f"{value:.5g}{remark(value)}" for value in found.values),
                 found.kind,
                 _shown(found.order, ".2f"),
                 _shown(found.richardson, ".5g"),

@@ -20,6 +20,7 @@ from alsph.geometry import FloatArray, Kind
 from alsph.parameters import suggest
 from alsph.reading import Snapshot
 from alsph.text import shown
+from alsph.window import DEVELOPING
 
 if TYPE_CHECKING:
     from alsph.analysis import Window
@@ -256,7 +257,7 @@ def forces(run: Run, body: str | None = None) -> Figure:
         span = [run.window.start, run.window.end]
         upper.plot(span, [drag.mean] * 2, "k--", lw=1)
         upper.set_title(f"mean $C_D$ = {drag.mean}", loc="left", fontsize="medium")
-        strouhal = "" if np.isnan(run.strouhal) else f",  Sr = {run.strouhal}"
+        strouhal = ",  no shedding found" if np.isnan(run.strouhal) else f",  Sr = {run.strouhal}"
         lower.set_title(f"rms $C_L$ = {lift.rms}{strouhal}", loc="left", fontsize="medium")
     lower.set_xlabel(TIME_LABEL)
     return figure
@@ -280,7 +281,8 @@ def spectrum(runs: dict[str, Run], body: str | None = None) -> Figure:
             if window.edges.size:
                 coefficient = run.coefficient(axis, body=body)
                 lines = analysis.amplitude_spectrum(time, coefficient, window.start, window.end)
-                axes.loglog(*(a[1:] for a in lines), lw=0.8, label=name)
+                label = f"{name}, {DEVELOPING}" if window.developing else name
+                axes.loglog(*(a[1:] for a in lines), lw=0.8, label=label)
         axes.set_ylabel(f"amplitude of ${symbol}$")
         axes.grid(alpha=0.3)
         if axes.lines:
@@ -293,6 +295,7 @@ def _finish(axes: Axes, window: Window, *, legend: bool = True) -> None:
     """Shade the averaging window, and put the legend above the panel, where it hides nothing."""
     if window.edges.size:
         label = f"averaged ({window.periods} periods)" if window.periods else "averaged"
+        label += f", {DEVELOPING}" if window.developing else ""
         axes.axvspan(window.start, window.end, color="0.92", zorder=0, label=label)
     axes.grid(alpha=0.3)
     if legend and axes.get_legend_handles_labels()[0]:
@@ -338,7 +341,8 @@ def pressure_coefficient(
     if coefficient.samples == 0:
         axes.text(0.5, 0.5, "no samples in the averaging window", ha="center", transform=axes.transAxes)
     axes.set(xlabel=r"$\theta$ from the front stagnation point [degrees]", ylabel="$C_p$", xlim=(0, 180))
-    axes.set_title(f"mean of {coefficient.samples} samples, band: ± 1 standard deviation", fontsize="medium")
+    still = f", {DEVELOPING}" if coefficient.developing else ""
+    axes.set_title(f"mean of {coefficient.samples} samples{still}, band: ± 1 standard deviation", fontsize="medium")
     axes.set_xticks(range(0, 181, 30))
     axes.grid(alpha=0.3)
     axes.legend()

@@ -72,12 +72,15 @@ class PressureCoefficient:
         Time average (22) and standard deviation in time; NaN where there are too few samples.
     samples : int
         Number of samples in the window.
+    developing : bool
+        Whether the flow still develops in the window.
     """
 
     theta: FloatArray
     mean: FloatArray
     deviation: FloatArray
     samples: int
+    developing: bool = False
 
 
 class Run:
@@ -207,7 +210,7 @@ class Run:
         time = self.history["time"]
         missing = np.full(len(time), np.nan)
         drag, lift = (self.coefficient(axis) for axis in "xy") if self.body else (missing, missing)
-        return analysis.averaging_window(time, drag, lift)
+        return analysis.averaging_window(time, drag, lift, self.config.case.thickness if self.body else 1.0)
 
     @cached_property
     def drag(self) -> Load:
@@ -247,7 +250,7 @@ class Run:
         angle, time, samples = reading.surface(self.path / "surface.h5")
         mean, deviation = analysis.mean_profile(time, samples, self.window)
         inside = np.count_nonzero((time >= self.window.start) & (time <= self.window.end))
-        return PressureCoefficient(angle, mean, deviation, int(inside))
+        return PressureCoefficient(angle, mean, deviation, int(inside), self.window.developing)
 
     def _measure(self, measure: Callable[[FloatArray, FloatArray, Window], Estimate], values: FloatArray) -> Estimate:
         if np.isnan(values).all():

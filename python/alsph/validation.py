@@ -135,7 +135,7 @@ class Row:
             f"{100 * measure.error:+.3g} %",
             f"{100 * measure.tolerance:g} %",
             "" if np.isnan(self.order) else f"{self.order:.1f}",
-            ("pass" if measure.passed else "FAIL") if self.judged else "",
+            (("pass" if measure.passed else "FAIL") if self.judged else "") + analysis.remark(measure.value),
         )
 
 

@@ -123,6 +123,11 @@ class Case(Parameters):
         """Kinematic viscosity ν [UD]."""
         return 1.0 / self.reynolds
 
+    @property
+    def thickness(self) -> float:
+        """Extent of the body that drag and lift are those of, across the stream [D]."""
+        return 1.0
+
     def body_force(self) -> list[float]:
         """Return the body force per unit mass (d,) [U²/D]."""
         return [0.0] * self.space_dimensions

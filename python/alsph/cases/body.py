@@ -97,6 +97,12 @@ class Body(Channel):
         """The single bodies of :attr:`outline`."""
         return list(shapely.get_parts(self.outline))
 
+    @property
+    def thickness(self) -> float:
+        """Extent of the bodies across the stream [D]."""
+        _, bottom, _, top = self.outline.bounds
+        return float(top - bottom)
+
     @cached_property
     def carried(self) -> list[shapely.Polygon | shapely.MultiPolygon]:
         """The single bodies without what is too thin for the resolution."""

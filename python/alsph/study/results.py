@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure as Picture
 
 from alsph import plotting
-from alsph.analysis import Estimate
+from alsph.analysis import Estimate, remark
 from alsph.config import Config
 from alsph.durable import check_target, replacing, write_text
 from alsph.errors import AlsphError, ConfigError
@@ -25,6 +25,7 @@ from alsph.study.declaration import Figure, Point, Study, text
 from alsph.study.state import ENDED, RUNS, State, states
 from alsph.tables import markdown
 from alsph.text import in_figure, printable
+from alsph.window import DEVELOPING
 
 DIVERGENCE = "mean velocity divergence, |∇·u| D/U"
 OF_ALL_RUNS = (
@@ -260,6 +261,9 @@ class Results:
                 if y in self.references[index]:
                     known[row[figure.x]] = self.references[index][y]
             curves = [Curve(name, *_sorted(points)) for name, points in series.items()]
+            early = [point for points in series.values() for point in points if remark(point[1])]
+            if early:
+                curves.append(Curve(DEVELOPING, *_sorted(early)[:2], style="rx"))
             if known:
                 curves.append(Curve("reference", *_sorted(list(known.items())), style="k--"))
             curves += [
@@ -330,7 +334,7 @@ def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, fl
             float(np.mean(history["time_step"])) / run.spacing,
             float(np.mean(history["iterations"])),
         )
-        return results | dict(zip(OF_ALL_RUNS, numbers, strict=True)), known
+        return results | {"averaging rule": run.window.rule} | dict(zip(OF_ALL_RUNS, numbers, strict=True)), known
     except (AlsphError, KeyError) as error:
         return {"message": str(error)}, {}
 
@@ -341,11 +345,12 @@ def _sorted(points: list[tuple[Any, Any]]) -> tuple[list[float], list[float], li
         points = [(str(x), y) for x, y in points]
     else:
         points = sorted(points, key=lambda point: point[0])
-    return [x for x, _ in points], [float(y) for _, y in points], [_uncertainty(y) or 0.0 for _, y in points]
+    bars = [_uncertainty(y) or 0.0 for _, y in points]
+    return [x for x, _ in points], [float(y) for _, y in points], [bar if np.isfinite(bar) else 0.0 for bar in bars]
 
 
 def _uncertainty(value: Any) -> float | None:
-    return value.uncertainty if isinstance(value, Estimate) and np.isfinite(value.uncertainty) else None
+    return value.uncertainty if isinstance(value, Estimate) and not np.isnan(value.uncertainty) else None
 
 
 def _is_nan(value: Any) -> bool:
