@@ -4,7 +4,7 @@ import json
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from alsph.durable import viewing
 from alsph.errors import RunFolderError
 from alsph.geometry import FloatArray, Kind
+from alsph.surface import Surface
 
 LARGEST_EXPANSION = 1032
 """Bytes that deflate makes of one byte at most."""
@@ -185,6 +186,21 @@ def surface(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
             raise ValueError(f"shapes {angle.shape}, {time.shape}, {samples.shape} do not match")
     count = min(len(time), len(samples))
     return angle, time[:count], samples[:count]
+
+
+def surface_points(path: Path) -> Surface | None:
+    """Read the geometry of the points in ``surface.h5``; None if there is no file yet or it is of an older version."""
+    if not path.exists():
+        return None
+    with _opened(path) as file:
+        if "position" not in file:
+            return None
+        names = [field.name for field in fields(Surface) if field.name in file]
+        arrays = {name: np.asarray(sound(file, name), float) for name in names}
+        shapes = {name: (len(arrays["angle"]), 2)[: values.ndim] for name, values in arrays.items()}
+        if any(arrays[name].shape != shape for name, shape in shapes.items()):
+            raise ValueError("the shapes of its points do not match")
+        return Surface(**arrays)
 
 
 def snapshot_times(path: Path) -> FloatArray:

@@ -1,7 +1,7 @@
 """What a run folder tells: forces, Strouhal number, pressure coefficient, divergence, snapshots and figures."""
 
 import html
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,11 +20,12 @@ from alsph.ledger import Ledger
 from alsph.measures import Measure, Profile
 from alsph.progress import duration
 from alsph.reading import Snapshot
+from alsph.surface import Surface
 
 
 @dataclass(frozen=True)
 class Load:
-    """A force coefficient, F / (½ρU²D), over the averaging window.
+    """A coefficient of a force, F / (½ρU²D), or moment, M / (½ρU²c²), over the averaging window.
 
     Attributes
     ----------
@@ -69,12 +70,33 @@ class PressureCoefficient:
         Time average (22) and standard deviation in time; NaN where there are too few samples.
     samples : int
         Number of samples in the window.
+    surface : Surface, optional
+        Where the samples were taken: x/c, side, arc length, normal and length of each piece of the surface, shape (m,).
     """
 
     theta: FloatArray
     mean: FloatArray
     deviation: FloatArray
     samples: int
+    surface: Surface | None = None
+
+    def force(self, part: int | None = None) -> FloatArray:
+        """Pressure parts of the mean drag and lift coefficient, −∮ C_p n ds: a check of the recorded ones.
+
+        Parameters
+        ----------
+        part : int, optional
+            Number of the closed curve; all of them if None.
+
+        Returns
+        -------
+        ndarray, shape (2,)
+            NaN where there are no samples, or an older version has not written where they were taken.
+        """
+        if self.surface is None:
+            return np.full(2, np.nan)
+        chosen = self.mean if part is None else np.where(self.surface.part == part, self.mean, 0.0)
+        return -self.surface.integral(chosen)
 
 
 class Run:
@@ -190,7 +212,9 @@ class Run:
 
     def load(self, axis: str, body: str | None = None) -> Load:
         """Force coefficient of a body along an axis over the averaging window (arguments as in :meth:`coefficient`)."""
-        total, pressure, viscous = (self.coefficient(axis, part, body) for part in ("total", "pressure", "viscous"))
+        return self._load(*(self.coefficient(axis, part, body) for part in ("total", "pressure", "viscous")))
+
+    def _load(self, total: FloatArray, pressure: FloatArray, viscous: FloatArray) -> Load:
         return Load(
             mean=self._measure(analysis.mean, total),
             rms=self._measure(analysis.root_mean_square, total),
@@ -198,6 +222,43 @@ class Run:
             pressure=self._measure(analysis.mean, pressure),
             viscous=self._measure(analysis.mean, viscous),
         )
+
+    def moment_coefficient(
+        self, part: str = "total", body: str | None = None, about: Sequence[float] | None = None
+    ) -> FloatArray:
+        """Pitching moment coefficient of a body in every step, M / (½ρU²c²), nose up positive, in 2-D.
+
+        The flow comes from the left, so that nose up is clockwise. c is the case's :attr:`~alsph.cases.Case.chord`.
+
+        Parameters
+        ----------
+        part : {"total", "pressure", "viscous"}
+        body : str, optional
+            Name of the body; the first one if None.
+        about : (x, y), optional
+            Point that the moment is about [D]; if None, that of the case: a quarter of the chord behind the leading
+            edge of a ``body``, the centre of a cylinder.
+
+        Returns
+        -------
+        ndarray, shape (steps,)
+            NaN if there is no such body.
+        """
+        case = self.config.case
+        centres = {each["name"]: each["center"] for each in case.bodies()}
+        name = body or next(iter(self.bodies), "")
+        parts = ("pressure", "viscous") if part == "total" else (part,)
+        columns = [self.history.get(f"{name}_{each}_torque") for each in parts]
+        if name not in centres or any(column is None for column in columns):
+            return np.full(len(self.history["time"]), np.nan)
+        torque = sum(column for column in columns if column is not None)
+        arm = np.subtract(centres[name], case.moment_point if about is None else about)
+        drag, lift = (self.coefficient(axis, part, name) for axis in "xy")
+        return np.asarray(-(2.0 * torque + arm[0] * lift - arm[1] * drag) / case.chord**2)
+
+    def moment(self, about: Sequence[float] | None = None, body: str | None = None) -> Load:
+        """Pitching moment coefficient over the averaging window (arguments as in :meth:`moment_coefficient`)."""
+        return self._load(*(self.moment_coefficient(part, body, about) for part in ("total", "pressure", "viscous")))
 
     @cached_property
     def strouhal(self) -> Estimate:
@@ -216,7 +277,11 @@ class Run:
         angle, time, samples = reading.surface(self.path / "surface.h5")
         mean, deviation = analysis.mean_profile(time, samples, self.window)
         inside = np.count_nonzero((time >= self.window.start) & (time <= self.window.end))
-        return PressureCoefficient(angle, mean, deviation, int(inside))
+        surface = reading.surface_points(self.path / "surface.h5")
+        if surface is None:  # of an older version, be it at the same points
+            case = self.config.case.surface_points()
+            surface = case if case and np.array_equal(case.angle, angle) else None
+        return PressureCoefficient(angle, mean, deviation, int(inside), surface)
 
     def _measure(self, measure: Callable[[FloatArray, FloatArray, Window], Estimate], values: FloatArray) -> Estimate:
         if np.isnan(values).all():
@@ -344,7 +409,7 @@ class Run:
     def plot_pressure_coefficient(
         self, path: str | Path | None = None, reference: tuple[FloatArray, FloatArray] | None = None
     ) -> Figure:
-        """Figure of C_p(θ) and a reference curve (θ in degrees, C_p); saved if `path` is given.
+        """Figure of C_p and a reference curve (θ in degrees, or x/c, and C_p); saved if `path` is given.
 
         Without a `reference`, that of :attr:`profiles` is drawn where there is one.
         """

@@ -21,6 +21,7 @@ from alsph.parameters import Parameters
 if TYPE_CHECKING:
     from alsph.results import Run
     from alsph.simulation import Simulation
+    from alsph.surface import Surface
 
 SUPPORT = {"quintic_spline": 3, "wendland_c2": 2, "wendland_c4": 2}
 """Support radius of each kernel in smoothing lengths."""
@@ -138,9 +139,20 @@ class Case(Parameters):
         """Return the solid bodies."""
         return []
 
-    def surface_points(self) -> tuple[FloatArray, FloatArray] | None:
-        """Return ``angle`` (m,) [degrees from the front] and ``position`` (m, d) of the C_p samples."""
+    def surface_points(self) -> Surface | None:
+        """Return where the surface pressure is sampled."""
         return None
+
+    @property
+    def chord(self) -> float:
+        """Length c that moment coefficients are formed with [D]."""
+        return 1.0
+
+    @property
+    def moment_point(self) -> FloatArray:
+        """Point (2,) that moments are taken about if no other is given [D]: the centre of the first body."""
+        centres = [body["center"] for body in self.bodies()] or [[np.nan, np.nan]]
+        return np.array(centres[0], float)
 
     def fluid_volume(self) -> float:
         """Return the volume of the space that the fluid fills [D^d]: that of the cells it is put in at first."""

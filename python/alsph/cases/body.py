@@ -15,6 +15,7 @@ from shapely import affinity
 from alsph.cases.channel import Channel
 from alsph.geometry import FloatArray, Solid, body_layers, inside
 from alsph.measures import Measure
+from alsph.surface import Surface, along, edges
 
 if TYPE_CHECKING:
     from alsph.results import Run
@@ -24,7 +25,8 @@ class Body(Channel):
     """Flow past a body of any shape in a channel with free-slip walls and uniform inflow U.
 
     D is the side of the square, the chord of the airfoil, or the unit of the file's lengths. The body's centroid lies
-    at (upstream, 0). The solid particles follow the surface; parts thinner than about 2Δx are badly resolved.
+    at (upstream, 0). The solid particles follow the surface; parts thinner than about 2Δx are badly resolved. Forces
+    are formed with D; moments with the chord c, the body's extent along x before it is turned, about the point at c/4.
     """
 
     name: ClassVar[str] = "body"
@@ -70,16 +72,33 @@ class Body(Channel):
         return ~inside(self.outline, points)
 
     def measures(self, run: Run) -> list[Measure]:
-        """Return the forces, the mean lift among them, which a body at an angle has, and the Strouhal number."""
-        return [*super().measures(run), Measure("mean lift coefficient", run.lift.mean)]
+        """Return the forces, among them what a body at an angle has: mean lift and moment; and the Strouhal number."""
+        return [
+            *super().measures(run),
+            Measure("mean lift coefficient", run.lift.mean),
+            Measure("mean pitching moment coefficient about c/4", run.moment().mean),
+        ]
 
-    def surface_points(self) -> tuple[FloatArray, FloatArray]:
-        """Return 144 points evenly along the surface; their angles are seen from the centroid."""
-        share = np.arange(144) / 144
-        points = shapely.get_coordinates(shapely.line_interpolate_point(self.outline.exterior, share, normalized=True))
-        angle = np.degrees(np.arctan2(points[:, 1], -points[:, 0])).round(9) % 360.0
-        order = np.argsort(angle, kind="stable")
-        return angle[order], self.centre + points[order]
+    @property
+    def chord(self) -> float:
+        """Extent c along the abscissa before the body is turned [D]."""
+        left, _, right, _ = self._upright.bounds
+        return float(right - left)
+
+    @property
+    def moment_point(self) -> FloatArray:
+        """The quarter-chord point (2,) [D]: c/4 behind the foremost point, on the line to the rearmost one."""
+        front, rear = edges(self._upright)
+        quarter = affinity.rotate(shapely.Point(0.75 * front + 0.25 * rear), -self.angle_of_attack, origin=(0, 0))
+        return np.array([quarter.x, quarter.y]) + self.centre
+
+    @property
+    def _upright(self) -> shapely.Polygon:
+        return affinity.rotate(self.outline, self.angle_of_attack, origin=(0, 0))
+
+    def surface_points(self) -> Surface:
+        """Return the pieces of the outline, from the leading edge over the upper side and back below."""
+        return along(self.outline, self.angle_of_attack).moved(self.centre)
 
 
 def _outline(shape: str) -> shapely.Polygon:

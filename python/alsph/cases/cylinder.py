@@ -13,6 +13,7 @@ from alsph.cases.channel import Channel
 from alsph.geometry import FloatArray, Solid, cylinder_rings
 from alsph.measures import Measure, Profile
 from alsph.reference import Reference
+from alsph.surface import Surface, circle
 
 if TYPE_CHECKING:
     from alsph.results import Run
@@ -45,11 +46,9 @@ class Cylinder(Channel):
         """Return which points are at least a radius from the centre."""
         return np.asarray(np.hypot(*points.T) >= RADIUS)
 
-    def surface_points(self) -> tuple[FloatArray, FloatArray]:
+    def surface_points(self) -> Surface:
         """Return 72 points on the cylinder, every 5 degrees from the front stagnation point over the upper side."""
-        angle = np.arange(0.0, 360.0, 5.0)
-        radians = np.radians(angle)
-        return angle, self.centre + RADIUS * np.stack([-np.cos(radians), np.sin(radians)], axis=1)
+        return circle(RADIUS, 72).moved(self.centre)
 
     def fluid_volume(self) -> float:
         """Return the area of the channel without the cylinder."""
