@@ -372,3 +372,14 @@ def test_a_wall_time_ends_a_study_that_goes_on_later(tmp_path):
         study.run(declared, tmp_path, walltime=1.5, progress=False)
     assert {state.status for state in study.states(declared.points(), tmp_path).values()} <= {"stopped", "waiting"}
     assert study.run(declared, tmp_path, progress=False).complete
+
+
+def test_remarks_on_a_run_stand_beside_its_results(tmp_path):
+    sweep = Sweep(product={"smoothing_ratio": [1.1, 1.25]})
+    figures = [Figure(name="decay", x="smoothing_ratio", y=[DECAY])]
+    results = study.run(declare(sweep=sweep, figures=figures), tmp_path, progress=False)
+    assert ["kernel" in row.get("remarks", "") for row in results.rows] == [True, False]
+    with (results.path / "results.csv").open() as file:
+        assert [row["remarks"] for row in csv.DictReader(file)] == [row.get("remarks", "") for row in results.rows]
+    assert "remarks" in results.to_markdown()
+    assert "kernel: 1 of 2 runs" in results.draw()["decay"].get_supxlabel()

@@ -321,7 +321,7 @@ def _plot(
         plotting.field_style(name)
     figures = output or path / "figures"
     drawings: dict[str, Callable[[Path], object]] = {
-        profile.file_name: plotting.profile({"computed": profile}).savefig for profile in run.profiles
+        profile.file_name: functools.partial(run.plot_profile, profile) for profile in run.profiles
     }
     drawings["ledger"] = run.plot_ledger
     if run.body:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
@@ -57,6 +58,13 @@ def field_style(name: str) -> FieldStyle:
     if name not in FIELDS:
         raise ConfigError(f"unknown field '{name}'; {suggest(name, FIELDS)}")
     return FIELDS[name]
+
+
+def remark(figure: Figure, text: str) -> None:
+    """Write a remark below a figure."""
+    if text:
+        width = int(figure.get_size_inches()[0] * 17)  # letters in a line
+        figure.supxlabel(textwrap.fill(text, width), fontsize="x-small", color="0.3", x=0.01, ha="left")
 
 
 def field(

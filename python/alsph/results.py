@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from alsph import analysis, plotting, reading, sampling
+from alsph import analysis, plotting, reading, remarks, sampling
 from alsph.analysis import Estimate, Window
 from alsph.config import Config
 from alsph.errors import ConfigError, RunFolderError
@@ -338,6 +338,14 @@ class Run:
         fields = snapshot.position[fluid], snapshot.velocity[fluid], snapshot.pressure[fluid]
         return sampling.control_volume(*fields, box, self.spacing, 1.0, viscosity)
 
+    @cached_property
+    def remarks(self) -> list[str]:
+        """What is to be borne in mind with the results, each as ``keyword: what it is; what explains it``.
+
+        What resolution, method and domain cannot carry (:meth:`alsph.cases.Case.remarks`), and what came of the run.
+        """
+        return [*remarks.outcome(self), *self.config.case.remarks()]
+
     def summary(self) -> dict[str, Any]:
         """Return the run's main results by name, its measures each followed by the reference value where there is one.
 
@@ -353,7 +361,7 @@ class Run:
             "computing time": duration(self.info.get("seconds", 0)),
             "time reached, tU/D": Estimate(self.history["time"][-1] if steps else 0.0),
             "steps": steps,
-            "steps ended by the iteration cap, %": self._capped(),
+            "iterations of a step": self._iterations(),
             "averaged from tU/D": Estimate(self.window.start),
             "averaged to tU/D": Estimate(self.window.end),
             "averaging rule": self.window.rule,
@@ -361,25 +369,28 @@ class Run:
         if self.body:
             results["shedding periods"] = self.window.periods
         results["mean velocity divergence, |∇·u| D/U"] = self.divergence.mean
+        results["largest velocity divergence, |∇·u| D/U"] = self.divergence.max
         for measure in self.measures:
             value = measure.value
             results[measure.name] = value if isinstance(value, Estimate) else Estimate(value)
             if np.abs(measure.reference) > 0:
                 results[f"{measure.name}, reference"] = Estimate(measure.reference)
+        results |= {f"remark {number}": remark for number, remark in enumerate(self.remarks, 1)}
         return {name: value for name, value in results.items() if value != ""}
 
-    def _capped(self) -> Estimate:
-        """Percentage of the steps that the iteration cap ended, not the tolerance."""
-        converged = self.history.get("converged", np.empty(0))
-        return Estimate(100 * (1 - converged.mean()) if converged.size else np.nan, note="no steps recorded yet")
+    def _iterations(self) -> str:
+        """How many iterations a step took, and how many it may take, in words."""
+        case, iterations = self.config.case, self.history.get("iterations", np.empty(0))
+        taken = f"{iterations.mean():.3g} of at most " if iterations.size else "at most "
+        return f"{taken}{case.max_iterations}, then {case.projection_sweeps} projection sweeps"
 
     def plot_forces(self, path: str | Path | None = None, body: str | None = None) -> Figure:
         """Figure of drag and lift over time with their parts and the averaging window; saved if `path` is given."""
-        return _saved(plotting.forces(self, body), path)
+        return self._saved(plotting.forces(self, body), path)
 
     def plot_spectrum(self, path: str | Path | None = None, body: str | None = None) -> Figure:
         """Figure of the spectra of drag and lift in the averaging window; saved if `path` is given."""
-        return _saved(plotting.spectrum({self.path.name: self}, body), path)
+        return self._saved(plotting.spectrum({self.path.name: self}, body), path)
 
     def plot_field(
         self,
@@ -404,7 +415,7 @@ class Run:
         view : (left, right, bottom, top), optional
             Part of the plane to show [D]; all of it if None.
         """
-        return _saved(plotting.field(self.snapshot(time), name, self.spacing, limit=limit, view=view), path)
+        return self._saved(plotting.field(self.snapshot(time), name, self.spacing, limit=limit, view=view), path)
 
     def plot_pressure_coefficient(
         self, path: str | Path | None = None, reference: tuple[FloatArray, FloatArray] | None = None
@@ -416,11 +427,21 @@ class Run:
         if reference is None:
             known = (profile.reference for profile in self.profiles if profile.name == "pressure coefficient")
             reference = next(known, None)
-        return _saved(plotting.pressure_coefficient(self.pressure_coefficient, reference), path)
+        return self._saved(plotting.pressure_coefficient(self.pressure_coefficient, reference), path)
+
+    def plot_profile(self, profile: Profile, path: str | Path | None = None) -> Figure:
+        """Figure of one of :attr:`profiles` beside its reference; saved if `path` is given."""
+        return self._saved(plotting.profile({"computed": profile}), path)
 
     def plot_ledger(self, path: str | Path | None = None) -> Figure:
         """Figure of divergence, iterations, time step, volume, mass and energy over time; saved if `path` is given."""
-        return _saved(plotting.ledger(self), path)
+        return self._saved(plotting.ledger(self), path)
+
+    def _saved(self, figure: Figure, path: str | Path | None) -> Figure:
+        plotting.remark(figure, remarks.brief(self.remarks))
+        if path is not None:
+            figure.savefig(path)
+        return figure
 
     def __repr__(self) -> str:
         """Name the folder, the case, the status and the time reached."""
@@ -431,9 +452,3 @@ class Run:
     def _repr_html_(self) -> str:
         rows = ((html.escape(name), html.escape(str(value))) for name, value in self.summary().items())
         return "<table>" + "".join(f"<tr><th>{name}</th><td>{value}</td></tr>" for name, value in rows) + "</table>"
-
-
-def _saved(figure: Figure, path: str | Path | None) -> Figure:
-    if path is not None:
-        figure.savefig(path)
-    return figure

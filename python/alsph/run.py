@@ -245,7 +245,12 @@ class _Driver:
         self.deadline = control.deadline
         verb = "resumed" if self.simulation.step else "started"
         self.folder.log(f"{verb} at {self.where}: {describe(self.provenance)}")
+        remarks = self.config.case.remarks()
+        for remark in remarks:
+            self.folder.log(f"remark: {remark}")
         with Reporter(self.config.until, self.simulation.time, enabled=control.progress) as reporter:
+            for remark in remarks:
+                reporter.say(f"remark: {remark}")
             try:
                 with _interruptible(control.stop) as signals:
                     finished = self._work(reporter, control)

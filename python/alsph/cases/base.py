@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from alsph import remarks
 from alsph.errors import ConfigError
 from alsph.geometry import FloatArray, Kind, Problem
 from alsph.measures import Measure, Profile
@@ -158,6 +159,40 @@ class Case(Parameters):
         """Return the volume of the space that the fluid fills [D^d]: that of the cells it is put in at first."""
         count = np.count_nonzero(self.particles()["kind"] == Kind.FLUID)
         return float(count * self.particle_spacing**self.space_dimensions)
+
+    @property
+    def validated(self) -> tuple[float, float, int] | None:
+        """Least and largest Re and least D/Δx that have been compared with the results of others (docs/results.md).
+
+        None where each run is compared with an exact solution of its own.
+        """
+        return None
+
+    @property
+    def cell_reynolds(self) -> float:
+        """Cell Reynolds number UΔx/ν [-]."""
+        return self.particle_spacing / self.kinematic_viscosity
+
+    @property
+    def boundary_layer(self) -> float:
+        """About how thick the thinnest boundary layer is that matters [D]; infinite without any."""
+        return math.inf
+
+    def scales(self) -> dict[str, float]:
+        """Return what the resolution must carry: lengths of the flow in Δx, and the cell Reynolds number, by name."""
+        scales = {"cell Reynolds number, UΔx/ν": self.cell_reynolds}
+        if math.isfinite(self.boundary_layer):
+            scales["thickness of the boundary layer, Δx"] = self.boundary_layer / self.particle_spacing
+        return scales
+
+    def remarks(self) -> list[str]:
+        """Return what this resolution, method and domain cannot carry, each as ``keyword: what it is; what to do``."""
+        known = self.validated
+        return [
+            *remarks.boundary_layer(self.boundary_layer, self.particle_spacing),
+            *(remarks.validated(self.reynolds, self.resolution, self.cell_reynolds, known) if known else []),
+            *remarks.kernel(self.kernel, self.smoothing_ratio),
+        ]
 
     def measures(self, run: Run) -> list[Measure]:
         """Return what a run of this case is judged by."""
@@ -315,19 +350,15 @@ class Case(Parameters):
         return {name: limits[name] / self.particle_spacing for name in ("penalty", "viscous", "body_force")}
 
     def time_step_warning(self) -> str | None:
-        """Return a warning if the time step lies above the stability law, which it names."""
+        """Return a warning if steps are to be taken above the stability law, which it names."""
         limits = self.time_step_limits()
         binding = min(limits, key=lambda name: limits[name])
-        if self.time_step <= limits[binding]:
+        if self.time_step <= limits[binding] or (self.adaptive_time_step and self.adaptive_until is None):
             return None
-        remedy = (
-            "adaptive_time_step takes smaller steps"
-            if self.adaptive_time_step and self.adaptive_until is None
-            else "expect divergence: lower time_step or switch adaptive_time_step on"
-        )
         return (
             f"time_step = {self.time_step:.4g} lies above the {binding.replace('_', ' ')} stability limit "
-            f"{limits[binding]:.4g} (ΔtU/Δx at u_max = {self.velocity_max:g} U); {remedy}"
+            f"{limits[binding]:.4g} (ΔtU/Δx at u_max = {self.velocity_max:g} U); "
+            "expect divergence: lower time_step or switch adaptive_time_step on"
         )
 
     def whole_cells(self, name: str, length: float) -> int:

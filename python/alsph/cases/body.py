@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 from shapely import affinity
 
+from alsph import remarks
 from alsph.cases.channel import Channel
 from alsph.geometry import FloatArray, Solid, body_layers, inside
 from alsph.measures import Measure
@@ -70,6 +71,22 @@ class Body(Channel):
     def outside(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return which points lie outside the outline."""
         return ~inside(self.outline, points)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Left, bottom, right and top of the outline, relative to its centroid [D]."""
+        left, bottom, right, top = self.outline.bounds
+        return left, bottom, right, top
+
+    def scales(self) -> dict[str, float]:
+        """Return those of the flow and the thickness of the body's thinnest part."""
+        thinnest = remarks.thinnest(self.outline) / self.particle_spacing
+        return super().scales() | {"thickness of the thinnest part, Δx": thinnest}
+
+    def remarks(self) -> list[str]:
+        """Return what is to be said of the resolution, the method, the channel and parts of the body."""
+        unknown = "not validated: flow past this body; it has not been compared with the results of others"
+        return [*super().remarks(), *remarks.thin_parts(self.outline, self.particle_spacing), unknown]
 
     def measures(self, run: Run) -> list[Measure]:
         """Return the forces, among them what a body at an angle has: mean lift and moment; and the Strouhal number."""

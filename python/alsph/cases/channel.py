@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
+from alsph import remarks
 from alsph.cases.base import Case
 from alsph.geometry import FloatArray, Kind, Solid, cell_centres, join, lattice, particles, symmetric_centres
 from alsph.measures import Measure
@@ -70,6 +71,23 @@ class Channel(Case):
     @abstractmethod
     def outside(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return which points (n, 2), relative to the centre of the body, lie outside it."""
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Left, bottom, right and top of the body, relative to its centre [D]."""
+        return -0.5, -0.5, 0.5, 0.5
+
+    @property
+    def boundary_layer(self) -> float:
+        """That at the front of a cylinder of the body's larger extent [D]."""
+        left, bottom, right, top = self.bounds
+        return remarks.LAYER * math.sqrt(self.kinematic_viscosity * max(right - left, top - bottom))
+
+    def remarks(self) -> list[str]:
+        """Return what is to be said of the resolution, the method and the channel."""
+        _, bottom, right, top = self.bounds
+        behind = self.length - self.upstream - right
+        return [*super().remarks(), *remarks.channel(top - bottom, self.upstream, behind, self.height)]
 
     @property
     def default_until(self) -> float:

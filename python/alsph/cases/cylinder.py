@@ -38,6 +38,11 @@ class Cylinder(Channel):
     body_name: ClassVar[str] = "cylinder"
     coefficient_body: ClassVar[str | None] = "cylinder"
 
+    @property
+    def validated(self) -> tuple[float, float, int]:
+        """What has been compared with an independent solution."""
+        return (100, 300, 10)
+
     def solid(self) -> Solid:
         """Return concentric rings."""
         return cylinder_rings(RADIUS, self.particle_spacing, self.support_layers)

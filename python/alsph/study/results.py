@@ -2,6 +2,7 @@
 
 import csv
 import html
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from alsph.errors import AlsphError
 from alsph.measures import Profile
 from alsph.parameters import suggest
 from alsph.plotting import Curve
+from alsph.remarks import keywords
 from alsph.results import Run
 from alsph.study.declaration import Figure, Point, Study, text
 from alsph.study.state import ENDED, RUNS, State, states
@@ -35,7 +37,8 @@ class Results:
         Folder of the tables and figures.
     rows : list of dict
         For each run its swept parameters, ``status``, ``time`` reached, ``folder``, and the results by name, numbers
-        with their uncertainty where they have one (:class:`alsph.analysis.Estimate`).
+        with their uncertainty where they have one (:class:`alsph.analysis.Estimate`); ``remarks`` are what there is to
+        be said of a run, its :attr:`alsph.Run.remarks` in short.
     references : list of dict
         Reference values of the same results, where they are known.
     states : list of State
@@ -63,11 +66,12 @@ class Results:
         references: list[dict[str, float]] = []
         for point, state in zip(points, reached, strict=True):
             folder = output / RUNS / point.name
-            results, known = _collected(folder, state)
+            results, known, remarked = _collected(folder, state)
             chosen = {name: results.get(name, Estimate(np.nan)) for name in study.collect} or results
             head = {"status": state.status, "time": state.time, "seconds": state.seconds}
             everything.append(results)
-            rows.append(dict(point.parameters) | head | chosen | {"folder": f"{RUNS}/{point.name}"})
+            tail = remarked | {"folder": f"{RUNS}/{point.name}"}
+            rows.append(dict(point.parameters) | head | chosen | tail)
             references.append(known)
         return cls(study, output / study.name, rows, references, reached, everything)
 
@@ -172,8 +176,17 @@ class Results:
     def draw(self) -> dict[str, Picture]:
         """Return the figures that can be drawn from the runs that have finished, by name."""
         draw = {"curves": self._curves, "profile": self._profiles, "fields": self._fields}
-        pictures = {figure.name: draw[figure.kind](figure) for figure in self.study.figures}
-        return {name: picture for name, picture in pictures.items() if picture is not None}
+        pictures = {}
+        for figure in self.study.figures:
+            if picture := draw[figure.kind](figure):
+                plotting.remark(picture, self._remarked(self._chosen(figure)))
+                pictures[figure.name] = picture
+        return pictures
+
+    def _remarked(self, chosen: list[int]) -> str:
+        """Say of how many of the runs there is what to remark."""
+        words = [word for index in chosen for word in self.rows[index].get("remarks", "").split(", ") if word]
+        return ", ".join(f"{word}: {count} of {len(chosen)} runs" for word, count in Counter(words).items())
 
     def _chosen(self, figure: Figure) -> list[int]:
         """Return the finished runs that a figure shows."""
@@ -260,10 +273,10 @@ def _time_of_largest_lift(run: Run) -> float | None:
     return float(times[np.argmax(at)])
 
 
-def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, float]]:
-    """Return the results of a finished run by name, and the reference values of those that have one."""
+def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, float], dict[str, str]]:
+    """Return the results of a finished run by name, the reference values of those that have one, and remarks."""
     if state.status != "finished":
-        return {}, {}
+        return {}, {}, {}
     try:
         run = Run(folder)
         results: dict[str, Any] = {measure.name: measure.value for measure in run.measures}
@@ -274,9 +287,9 @@ def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, fl
         results["steps"] = len(run.history["time"])
         results["mean time step, ΔtU/Δx"] = float(np.mean(run.history["time_step"])) / run.spacing
         results["mean iterations"] = float(np.mean(run.history["iterations"]))
-        return results, known
+        return results, known, {"remarks": keywords(run.remarks)} if run.remarks else {}
     except (AlsphError, KeyError) as error:
-        return {"message": str(error)}, {}
+        return {"message": str(error)}, {}, {}
 
 
 def _sorted(points: list[tuple[Any, Any]]) -> tuple[list[float], list[float], list[float]]:

@@ -1,0 +1,149 @@
+import math
+
+import numpy as np
+import pytest
+import shapely
+from alsph import Run, remarks
+from alsph.cases import CASES, BackwardFacingStep, Body, Cavity, Cylinder, Poiseuille, TaylorGreen
+from shapely import affinity
+from synthetic import write_run
+
+
+def about(case):
+    return remarks.keywords(case.remarks())
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if name != "body"])
+def test_cases_as_they_come_need_no_remark(name):
+    assert CASES[name]().remarks() == []
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        *(Cylinder(reynolds=re, resolution=n) for re in (100, 200) for n in (20, 30)),
+        *(Cavity(reynolds=re, resolution=n) for re, n in ((100, 25), (400, 50), (1000, 50), (1000, 150))),
+        BackwardFacingStep(reynolds=389, resolution=10),
+        Poiseuille(resolution=10),
+        TaylorGreen(resolution=100),
+        TaylorGreen(dimensions=3, resolution=16),
+        Cylinder(height=60.0, upstream=30.0, length=90.0),
+        Poiseuille(kernel="wendland_c2", smoothing_ratio=1.75),
+    ],
+)
+def test_what_has_been_compared_with_references_needs_no_remark(case):
+    assert case.remarks() == []
+
+
+@pytest.mark.parametrize(
+    ("case", "keywords"),
+    [
+        (Cylinder(reynolds=200, resolution=10), "coarse"),
+        (Cylinder(reynolds=100, resolution=10), "coarse"),
+        (Cylinder(reynolds=1e5, resolution=8), "not resolved, not validated"),
+        (Cylinder(reynolds=1e7, resolution=8), "not resolved, not validated"),
+        (Cylinder(reynolds=1e5, resolution=400), "not validated"),
+        (Cylinder(reynolds=40), "not validated"),
+        (Cavity(reynolds=1e4, resolution=50), "coarse, not validated"),
+        (BackwardFacingStep(reynolds=800), "not validated"),
+        (TaylorGreen(dimensions=3, reynolds=1600), "not validated"),
+        (Poiseuille(kernel="wendland_c2", smoothing_ratio=1.0), "kernel"),
+        (Poiseuille(kernel="wendland_c4"), "kernel"),
+        (TaylorGreen(smoothing_ratio=1.1), "kernel"),
+        (Cylinder(length=3.0, height=13.0, upstream=1.5), "short channel"),
+        (Cylinder(height=5.0), "narrow channel"),
+        (Body(), "not validated"),
+        (Body(shape="naca0012"), "thin part, not validated"),
+    ],
+)
+def test_what_cannot_be_carried_is_remarked_upon(case, keywords):
+    assert about(case) == keywords
+
+
+def test_remarks_tell_the_numbers_and_the_remedy():
+    (coarse,) = Cylinder(reynolds=200, resolution=10).remarks()
+    assert "0.849 Δx" in coarse and "resolution = 18 puts two particles into it" in coarse
+    assert Cylinder(reynolds=200, resolution=18).remarks() == []
+    layer = Cylinder(reynolds=1e5, resolution=8).remarks()[0]
+    assert layer.startswith("not resolved: boundary layer of 0.0304 Δx") and "resolution = 396" in layer
+    outlet, inlet = Cylinder(length=3.0, height=13.0, upstream=1.5).remarks()
+    assert "outlet 1 D behind" in outlet and "slows the stream there by about 11 %" in inlet
+    assert Cylinder(reynolds=250, resolution=10).scales() == pytest.approx(
+        {"cell Reynolds number, UΔx/ν": 25.0, "thickness of the boundary layer, Δx": 12 / math.sqrt(250)}
+    )
+
+
+def test_the_boundary_layer_is_that_of_the_bodys_own_size(tmp_path):
+    half = tmp_path / "half.txt"
+    half.write_text("-0.25 -0.25\n0.25 -0.25\n0.25 0.25\n-0.25 0.25\n")
+    assert Body(shape=str(half)).boundary_layer == pytest.approx(Cylinder().boundary_layer / math.sqrt(2))
+
+
+ELLIPSE = affinity.scale(shapely.Point(0, 0).buffer(1, quad_segs=64), 0.5, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("shape", "thickness"),
+    [
+        (shapely.box(0, 0, 1, 1), 1.0),
+        (shapely.box(0, 0, 0.04, 1), 0.04),
+        (affinity.rotate(shapely.box(0, 0, 0.3, 1), 33), 0.3),
+        (shapely.Point(0, 0).buffer(0.5), 1.0),
+        (ELLIPSE, 0.4),
+        (shapely.box(0, 0, 1, 1) | shapely.box(1, 0.4, 2, 0.45), 0.05),
+        (shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(2, 0, 2.1, 1)]), 0.1),
+        (shapely.Polygon([(0, 0), (1, 0.1), (1, -0.1)]), 0.0),
+        (shapely.box(0, 0, 1e-3, 1e-3), 1e-3),
+    ],
+)
+def test_thickness_of_the_thinnest_part(shape, thickness):
+    assert remarks.thinnest(shape) == pytest.approx(thickness, rel=0.01, abs=2e-3 * thickness + 1e-4)
+
+
+def test_thin_parts_are_those_below_two_spacings():
+    plate = shapely.box(0, 0, 0.24, 1)
+    (remark,) = remarks.thin_parts(plate, 1 / 8)
+    assert remark.startswith("thin part: all of the body is thinner than 2 Δx")
+    assert remarks.thin_parts(plate, 1 / 9) == []
+    # A wedge of half angle a is thinner than 2r over r(1/sin a - 1).
+    wedge = shapely.Polygon([(0, 0), (1, 0.1), (1, -0.1)])
+    length = 0.05 * (1 / math.sin(math.atan(0.1)) - 1)
+    (remark,) = remarks.thin_parts(wedge, 0.05)
+    assert f"the outermost {length:.2g}" in remark
+
+
+def test_remarks_of_a_run(tmp_path):
+    run = Run(write_run(tmp_path / "run"))
+    assert remarks.keywords(run.remarks) == "coarse, narrow channel"
+    assert run.summary()["remark 1"] == run.remarks[0]
+    short = Run(write_run(tmp_path / "short", end=15.0))
+    assert remarks.keywords(short.remarks).startswith("not settled")
+    info = tmp_path / "run" / "run.json"
+    info.write_text('{"status": "diverged", "retries": [{"step": 3, "time_step": 0.01}]}')
+    lines = (tmp_path / "run" / "history.csv").read_text().splitlines(keepends=True)
+    column = lines[0].split(",").index("cylinder_pressure_force_x")
+    cells = [line.rstrip("\n").split(",") for line in lines[1:3000]]
+    rows = [",".join([*row[:column], "-9", *row[column + 1 :]]) + "\n" for row in cells]
+    (tmp_path / "run" / "history.csv").write_text(lines[0] + "".join(rows))
+    broken = Run(tmp_path / "run")
+    assert remarks.keywords(broken.remarks).startswith("diverged, retried")
+    assert "unphysical" in remarks.keywords(broken.remarks)
+    assert broken.remarks[0].startswith("diverged: at tU/D = 29.9") and "of 60" in broken.remarks[0]
+
+
+def test_pictures_and_information_carry_the_remarks(tmp_path, alsph):
+    path = write_run(tmp_path / "run")
+    for figure in (Run(path).plot_forces(), Run(path).plot_field("pressure"), Run(path).plot_pressure_coefficient()):
+        assert "coarse: boundary layer of 0.849 Δx" in figure.get_supxlabel()
+        assert "puts two particles" not in figure.get_supxlabel()
+    assert "coarse: boundary layer of 0.849 Δx" in alsph("info", path)[1]
+    code, stdout, _ = alsph("describe", "cylinder", "--reynolds=1e5", "--resolution=8", "--no-probe")
+    assert (code, "remark" in stdout, "not resolved: boundary layer of 0.0304 Δx" in stdout) == (0, True, True)
+    assert "remark" not in alsph("describe", "cylinder", "--no-probe")[1]
+
+
+def test_a_figure_without_remarks_has_no_footer(tmp_path):
+    case = Cylinder(reynolds=200, resolution=20)
+    run = Run(write_run(tmp_path / "run", case))
+    assert run.remarks == [] and run.plot_forces().get_supxlabel() == ""
+    assert np.isfinite(run.drag.mean)
