@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -79,6 +80,12 @@ def test_the_boundary_layer_is_that_of_the_bodys_own_size(tmp_path):
     assert Body(shape=str(half)).boundary_layer == pytest.approx(Cylinder().boundary_layer / math.sqrt(2))
 
 
+def test_of_several_bodies_the_smallest_has_the_thinnest_layer(monkeypatch):
+    two = shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(2, 0, 2.25, 0.25)])
+    monkeypatch.setattr(Body, "outline", two)
+    assert Body().boundary_layer == pytest.approx(0.5 * Cylinder().boundary_layer)
+
+
 ELLIPSE = affinity.scale(shapely.Point(0, 0).buffer(1, quad_segs=64), 0.5, 0.2)
 
 
@@ -116,8 +123,13 @@ def test_remarks_of_a_run(tmp_path):
     run = Run(write_run(tmp_path / "run"))
     assert remarks.keywords(run.remarks) == "coarse, narrow channel"
     assert run.summary()["remark 1"] == run.remarks[0]
-    short = Run(write_run(tmp_path / "short", end=15.0))
-    assert remarks.keywords(short.remarks).startswith("not settled")
+    short = Run(tmp_path / "run")
+    short.window = replace(short.window, edges=short.window.edges[:5], periods=4)
+    assert remarks.outcome(short) == ["few periods: averaged over 4 of shedding; a longer run tells more"]
+    short.window = replace(short.window, settled=False, rule="shedding not periodic yet")
+    assert remarks.outcome(short) == ["not settled: shedding not periodic yet"]
+    short.window = replace(short.window, rule="still developing (drag changes by 2 %); later half of the periods")
+    assert remarks.outcome(short) == ["still developing: drag changes by 2 %; later half of the periods"]
     info = tmp_path / "run" / "run.json"
     info.write_text('{"status": "diverged", "retries": [{"step": 3, "time_step": 0.01}]}')
     lines = (tmp_path / "run" / "history.csv").read_text().splitlines(keepends=True)

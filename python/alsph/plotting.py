@@ -64,7 +64,9 @@ def remark(figure: Figure, text: str) -> None:
     """Write a remark below a figure."""
     if text:
         width = int(figure.get_size_inches()[0] * 17)  # letters in a line
-        figure.supxlabel(textwrap.fill(text, width), fontsize="x-small", color="0.3", x=0.01, ha="left")
+        figure.supxlabel(
+            textwrap.fill(text, width), fontsize="x-small", color="0.3", x=0.01, ha="left", parse_math=False
+        )
 
 
 def field(

@@ -177,9 +177,12 @@ def outcome(run: Run) -> list[str]:
         text = f"mean |∇·u| = {float(run.divergence.mean):.2g} U/D"
         found.append(f"not divergence-free: {text}; more projection_sweeps or max_iterations lower it")
     if run.body and run.window.edges.size:
-        if not run.window.settled:
-            found.append(f"not settled: {run.window.rule}")
-        elif run.window.periods < FEW_PERIODS:
+        rule = run.window.rule
+        if rule.startswith("still developing ("):
+            found.append(rule.replace(" (", ": ", 1).replace(")", "", 1))
+        elif run.window.periods and not run.window.settled:
+            found.append(f"not settled: {rule}")
+        elif 0 < run.window.periods < FEW_PERIODS:
             found.append(f"few periods: averaged over {run.window.periods} of shedding; a longer run tells more")
         if run.drag.mean < 0:
             found.append(f"unphysical: mean drag coefficient {run.drag.mean}; a stream drags a body at rest along")

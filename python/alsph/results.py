@@ -245,16 +245,16 @@ class Run:
             NaN if there is no such body.
         """
         case = self.config.case
+        point = case.moment_point if about is None else np.array(about, float)
         centres = {each["name"]: each["center"] for each in case.bodies()}
-        name = body or next(iter(self.bodies), "")
-        parts = ("pressure", "viscous") if part == "total" else (part,)
-        columns = [self.history.get(f"{name}_{each}_torque") for each in parts]
-        if name not in centres or any(column is None for column in columns):
-            return np.full(len(self.history["time"]), np.nan)
-        torque = sum(column for column in columns if column is not None)
-        arm = np.subtract(centres[name], case.moment_point if about is None else about)
-        drag, lift = (self.coefficient(axis, part, name) for axis in "xy")
-        return np.asarray(-(2.0 * torque + arm[0] * lift - arm[1] * drag) / case.chord**2)
+        missing = np.full(len(self.history["time"]), np.nan)
+        moment = np.zeros_like(missing)
+        for name in [body] if body else self.bodies[:1]:
+            for each in ("pressure", "viscous") if part == "total" else (part,):
+                moment += 2.0 * self.history.get(f"{name}_{each}_torque", missing)
+            arm = np.subtract(centres.get(name, np.nan), point)
+            moment += arm[0] * self.coefficient("y", part, name) - arm[1] * self.coefficient("x", part, name)
+        return -moment / case.chord**2
 
     def moment(self, about: Sequence[float] | None = None, body: str | None = None) -> Load:
         """Pitching moment coefficient over the averaging window (arguments as in :meth:`moment_coefficient`)."""

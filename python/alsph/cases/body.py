@@ -78,6 +78,12 @@ class Body(Channel):
         left, bottom, right, top = self.outline.bounds
         return left, bottom, right, top
 
+    @property
+    def size(self) -> float:
+        """Larger extent of the body, of the smallest one if there are several [D]."""
+        lower, upper = np.split(shapely.bounds(shapely.get_parts(self.outline)), 2, axis=1)
+        return float((upper - lower).max(axis=1).min())
+
     def scales(self) -> dict[str, float]:
         """Return those of the flow and the thickness of the body's thinnest part."""
         thinnest = remarks.thinnest(self.outline) / self.particle_spacing

@@ -78,10 +78,14 @@ class Channel(Case):
         return -0.5, -0.5, 0.5, 0.5
 
     @property
+    def size(self) -> float:
+        """Larger extent of the body, of the smallest one if there are several [D]."""
+        return 1.0
+
+    @property
     def boundary_layer(self) -> float:
         """That at the front of a cylinder of the body's larger extent [D]."""
-        left, bottom, right, top = self.bounds
-        return remarks.LAYER * math.sqrt(self.kinematic_viscosity * max(right - left, top - bottom))
+        return remarks.LAYER * math.sqrt(self.kinematic_viscosity * self.size)
 
     def remarks(self) -> list[str]:
         """Return what is to be said of the resolution, the method and the channel."""
