@@ -197,9 +197,9 @@ def surface_points(path: Path) -> Surface | None:
             return None
         names = [field.name for field in fields(Surface) if field.name in file]
         arrays = {name: np.asarray(sound(file, name), float) for name in names}
-        shapes = {name: (len(arrays["angle"]), 2)[: values.ndim] for name, values in arrays.items()}
-        if any(arrays[name].shape != shape for name, shape in shapes.items()):
-            raise ValueError("the shapes of its points do not match")
+        for name, values in arrays.items():
+            if values.shape != (arrays["angle"].size, 2)[: 2 if name in ("position", "normal") else 1]:
+                raise ValueError(f"{name} of shape {values.shape} does not match {arrays['angle'].size} points")
         return Surface(**arrays)
 
 
