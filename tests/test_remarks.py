@@ -159,3 +159,9 @@ def test_a_figure_without_remarks_has_no_footer(tmp_path):
     run = Run(write_run(tmp_path / "run", case))
     assert run.remarks == [] and run.plot_forces().get_supxlabel() == ""
     assert np.isfinite(run.drag.mean)
+
+
+def test_a_study_says_before_it_runs_what_its_cases_cannot_carry(tmp_path, alsph):
+    assert remarks.tally(["coarse, kernel", "", "coarse"]) == "coarse: 2 of 3 runs, kernel: 1 of 3 runs"
+    stdout = alsph("study", "run", "time-step", "--preset", "quick", "--dry-run", "-o", tmp_path)[1]
+    assert "remarks: coarse: 20 of 20 runs" in stdout

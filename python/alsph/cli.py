@@ -24,6 +24,7 @@ from alsph.describe import describe
 from alsph.errors import AlsphError, ConfigError, Interrupted, WalltimeError
 from alsph.parameters import Parameters, describe_default
 from alsph.progress import seconds_of
+from alsph.remarks import keywords, tally
 from alsph.repetition import repeat
 from alsph.results import Run
 from alsph.run import Control, resume, start
@@ -420,6 +421,8 @@ def _print_states(declared: study.Study, output: Path) -> None:
     points = declared.points()
     for line in overview(points, study.states(points, output)):
         typer.echo(line)
+    if remarked := tally([keywords(point.config.case.remarks()) for point in points]):
+        typer.echo(f"remarks: {remarked}")
 
 
 @app.command("info")

@@ -6,7 +6,8 @@ A remark is a text ``keyword: what it is; what to do about it``. Each limit says
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import shapely
@@ -44,6 +45,12 @@ FEW_PERIODS = 5
 def keywords(remarks: Iterable[str]) -> str:
     """Return what the remarks are about, each once."""
     return ", ".join(dict.fromkeys(remark.partition(":")[0] for remark in remarks))
+
+
+def tally(runs: Sequence[str]) -> str:
+    """Return of how many of the runs, each given by its :func:`keywords`, there is what to remark."""
+    words = Counter(word for run in runs for word in run.split(", ") if word)
+    return ", ".join(f"{word}: {count} of {len(runs)} runs" for word, count in words.items())
 
 
 def brief(remarks: Iterable[str]) -> str:

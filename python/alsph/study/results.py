@@ -2,7 +2,6 @@
 
 import csv
 import html
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from alsph.errors import AlsphError
 from alsph.measures import Profile
 from alsph.parameters import suggest
 from alsph.plotting import Curve
-from alsph.remarks import keywords
+from alsph.remarks import keywords, tally
 from alsph.results import Run
 from alsph.study.declaration import Figure, Point, Study, text
 from alsph.study.state import ENDED, RUNS, State, states
@@ -179,14 +178,9 @@ class Results:
         pictures = {}
         for figure in self.study.figures:
             if picture := draw[figure.kind](figure):
-                plotting.remark(picture, self._remarked(self._chosen(figure)))
+                plotting.remark(picture, tally([self.rows[k].get("remarks", "") for k in self._chosen(figure)]))
                 pictures[figure.name] = picture
         return pictures
-
-    def _remarked(self, chosen: list[int]) -> str:
-        """Say of how many of the runs there is what to remark."""
-        words = [word for index in chosen for word in self.rows[index].get("remarks", "").split(", ") if word]
-        return ", ".join(f"{word}: {count} of {len(chosen)} runs" for word, count in Counter(words).items())
 
     def _chosen(self, figure: Figure) -> list[int]:
         """Return the finished runs that a figure shows."""
