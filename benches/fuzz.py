@@ -101,6 +101,7 @@ def targets(folder):
         "checkpoint of version 1": ("version_1.h5", checkpoint.read),
         "particles": ("particles.vtkhdf", snapshots),
         "surface": ("surface.h5", reading.surface),
+        "points of the surface": ("surface.h5", reading.surface_points),
         "history": ("history.csv", reading.history),
         "run.json": ("run.json", whole),
         "case.toml of a run": ("case.toml", whole),

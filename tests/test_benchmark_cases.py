@@ -241,8 +241,11 @@ def test_fluid_flows_around_the_body(shape, angle):
     assert shapely.distance(body, shapely.points(fluid)).min() > 0.35 * case.particle_spacing
     assert shapely.contains_xy(body, *solid.T).all()
     assert len(fluid) == pytest.approx((20 - body.area) * 400, abs=1)
-    angles, points = case.surface_points()
-    assert (np.diff(angles) >= 0).all() and angles[0] >= 0 and angles[-1] < 360
+    surface = case.surface_points()
+    angles, points = surface.angle, surface.position
+    assert angles.min() >= 0 and angles.max() < 360
+    assert (np.diff(surface.chord[surface.side > 0]) > -1e-12).all()
+    assert (np.diff(surface.chord[surface.side < 0]) < 1e-12).all()
     assert shapely.distance(case.outline.exterior, shapely.points(points - [2, 0])).max() < 1e-9
     directions = np.stack([-np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
     assert (points - [2, 0]) / np.hypot(*(points - [2, 0]).T)[:, None] == pytest.approx(directions, abs=1e-8)

@@ -91,8 +91,12 @@ def test_algorithms(algorithm, frame, search):
 
 def test_time_step_warning_names_the_limit():
     assert Cylinder().time_step_warning() is None
-    assert "penalty stability limit 0.06" in Cylinder(time_step=0.08).time_step_warning()
-    assert "viscous stability limit" in Cylinder(reynolds=0.1).time_step_warning()
+    fixed = {"adaptive_time_step": False}
+    assert "penalty stability limit 0.06" in Cylinder(time_step=0.08, **fixed).time_step_warning()
+    assert "viscous stability limit" in Cylinder(reynolds=0.1, **fixed).time_step_warning()
+    assert "expect divergence" in Cylinder(time_step=0.08, adaptive_until=1.0).time_step_warning()
+    for handled in (Cylinder(time_step=0.08), Cylinder(reynolds=0.1)):
+        assert handled.time_step_warning() is None
     with pytest.warns(UserWarning, match="expect divergence"):
         Cylinder(time_step=0.2, adaptive_time_step=False, resolution=8).simulation()
 

@@ -88,6 +88,8 @@ def test_describe(alsph, small_options):
     assert "s a step" in stdout
     code, stdout, _ = alsph("describe", "cylinder", "--time-step=0.1", "--no-probe")
     assert "estimated time" not in stdout
+    assert "0.06393 at u_max = 1.5 U (binds)" in stdout and "warning" not in stdout
+    code, stdout, _ = alsph("describe", "cylinder", "--time-step=0.1", "--no-adaptive-time-step", "--no-probe")
     assert "lies above the penalty stability limit" in stdout
 
 

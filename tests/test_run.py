@@ -212,9 +212,13 @@ def test_run_in_a_thread(small, tmp_path):
 def test_plain_progress(small, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("alsph.progress.PLAIN_SECONDS", 0.0)
     small.run(tmp_path / "run", until=0.1)
-    lines = capsys.readouterr().out.splitlines()
+    printed = capsys.readouterr().out.splitlines()
+    remarks = [f"remark: {remark}" for remark in small.remarks()]
+    assert remarks and printed[: len(remarks)] == remarks
+    assert all(remark in (tmp_path / "run" / "run.log").read_text() for remark in remarks)
+    lines = printed[len(remarks) :]
     assert lines
-    for text in ("%", "steps/s", "ETA", "t* ", "2 iter (cap)", "max|∇·u|", "C_D", "C_L", "particles"):
+    for text in ("%", "steps/s", "ETA", "t* ", "2 iter  ", "max|∇·u|", "C_D", "C_L", "particles"):
         assert text in lines[0]
 
 

@@ -427,3 +427,14 @@ def test_the_results_of_a_run_are_known_beforehand(tmp_path, case):
 def test_the_studies_that_come_with_alsph_ask_for_what_there_is(name):
     declared = study.load(name)
     study.check_names(declared, declared.points())
+
+
+def test_remarks_on_a_run_stand_beside_its_results(tmp_path):
+    sweep = Sweep(product={"smoothing_ratio": [1.1, 1.25]})
+    figures = [Figure(name="decay", x="smoothing_ratio", y=[DECAY])]
+    results = study.run(declare(sweep=sweep, figures=figures), tmp_path, progress=False)
+    assert ["kernel" in row.get("remarks", "") for row in results.rows] == [True, False]
+    with (results.path / "results.csv").open() as file:
+        assert [row["remarks"] for row in csv.DictReader(file)] == [row.get("remarks", "") for row in results.rows]
+    assert "remarks" in results.to_markdown()
+    assert "kernel: 1 of 2 runs" in results.draw()["decay"].get_supxlabel()

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import pytest
 from alsph import Run, analysis, validate, validation
@@ -185,3 +186,9 @@ def test_mistakes_are_exit_code_2(fast, alsph, tmp_path, arguments, message):
     code, _, stderr = alsph("validate", *arguments, "-o", tmp_path / "out")
     assert (code, message in stderr) == (2, True)
     assert not (tmp_path / "out").exists()
+
+
+def test_the_report_carries_the_remarks_on_its_runs(finished, monkeypatch):
+    monkeypatch.setattr(TaylorGreen, "remarks", lambda self: ["coarse: of few particles; take more"])
+    again = replace(finished, runs=[Run(run.path) for run in finished.runs])
+    assert "| coarse" in again.to_markdown() and "remarks" in finished.to_markdown()

@@ -23,6 +23,7 @@ from alsph.durable import check_folder
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters, describe_default
 from alsph.progress import seconds_of
+from alsph.remarks import keywords, tally
 from alsph.repetition import repeat
 from alsph.results import Run
 from alsph.run import Control, resume, start
@@ -318,8 +319,7 @@ def _plot(
         plotting.field_style(name)
     figures = output or path / "figures"
     drawings: dict[str, Callable[[Path], object]] = {
-        profile.file_name: functools.partial(plotting.save, plotting.profile({"computed": profile}))
-        for profile in run.profiles
+        profile.file_name: functools.partial(run.plot_profile, profile) for profile in run.profiles
     }
     drawings["ledger"] = run.plot_ledger
     if run.body:
@@ -423,6 +423,8 @@ def _print_states(declared: study.Study, output: Path) -> None:
     points = declared.points()
     for line in overview(points, study.states(points, output)):
         say(printable(line))
+    if remarked := tally([keywords(point.config.case.remarks()) for point in points]):
+        say(f"remarks: {remarked}")
 
 
 @app.command("info")

@@ -177,6 +177,7 @@ class Report:
         """Write ``convergence.md`` and ``convergence.png``."""
         picture = self.draw()
         lines = ["# Convergence", str(self)]
+        lines += [f"D/Δx = {row['resolution']}: {row['remarks']}" for row in self.results.rows if "remarks" in row]
         if picture:
             plotting.save(picture, self.path / "convergence.png", dpi=120)
             lines.append("![Each measure over the particle spacing](convergence.png)")

@@ -43,7 +43,8 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
         ("resolution", f"D/Δx = {case.resolution}, Δx = {case.particle_spacing:.6g} D"),
         ("particles", f"{kinds.sum():,}: {counts}"),
         ("memory", f"about {np.ceil(case.memory() / 2**20):,.0f} MiB, beside Python's own"),
-        ("time step", f"ΔtU/Δx = {case.time_step:.4g}" + (" or less (adaptive)" if case.adaptive_time_step else "")),
+        *((name, f"{value:.3g}") for name, value in case.scales().items()),
+        ("time step", f"ΔtU/Δx = {step:.4g}" + (" (adaptive)" if case.adaptive_time_step else "")),
     ]
     for name, limit in limits.items():
         if np.isfinite(limit):
@@ -55,7 +56,7 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
         lines.append(("estimated time", f"{duration(seconds * steps)} at {seconds:.3g} s a step"))
     if warning := case.time_step_warning():
         lines.append(("warning", warning))
-    return lines
+    return lines + [("remark", remark) for remark in case.remarks()]
 
 
 def _seconds_per_step(simulation: Simulation) -> float:

@@ -13,7 +13,7 @@ import re
 import shutil
 import time as clock
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -224,10 +224,20 @@ class RunFolder:
         self._make_room(size_of(particles))
         self._append("particles.vtkhdf", lambda path: vtkhdf.append(path, time, particles))
 
-    def append_surface(self, time: FloatArray, angle: FloatArray, pressure_coefficient: FloatArray) -> None:
-        """Append to ``surface.h5``: samples (k, m) of C_p at times (k,) and angles (m,) [degrees]."""
+    def append_surface(
+        self,
+        time: FloatArray,
+        angle: FloatArray,
+        pressure_coefficient: FloatArray,
+        geometry: Mapping[str, FloatArray] | None = None,
+    ) -> None:
+        """Append to ``surface.h5``: samples (k, m) of C_p at times (k,) and angles (m,) [degrees].
+
+        A new file also takes the `geometry` of the points, by name (:class:`alsph.surface.Surface`).
+        """
         self._make_room(pressure_coefficient.nbytes)
-        self._append("surface.h5", lambda path: _append_surface(path, time, angle, pressure_coefficient))
+        points = {"angle": angle} | dict(geometry or {})
+        self._append("surface.h5", lambda path: _append_surface(path, time, points, pressure_coefficient))
 
     def _append(self, name: str, append: Callable[[Path], None]) -> None:
         """Append to a file; one that has been damaged since it was written last is set aside, and a new one begun."""
@@ -372,14 +382,18 @@ def _unless_damaged(path: Path, change: Callable[[Path], None]) -> str:
     return ""
 
 
-def _append_surface(path: Path, time: FloatArray, angle: FloatArray, pressure_coefficient: FloatArray) -> None:
+def _append_surface(
+    path: Path, time: FloatArray, points: Mapping[str, FloatArray], pressure_coefficient: FloatArray
+) -> None:
     with growing(path) as file:
+        count = len(points["angle"])
         if "time" not in file:
-            file["angle"] = angle
-            file.create_dataset(
-                "pressure_coefficient", (0, len(angle)), float, maxshape=(None, len(angle)), chunks=(64, len(angle))
-            )
+            for name, values in points.items():
+                file[name] = values
+            file.create_dataset("pressure_coefficient", (0, count), float, maxshape=(None, count), chunks=(64, count))
             file.create_dataset("time", (0,), float, maxshape=(None,), chunks=(64,))
+        elif not (len(file["angle"]) == count and np.allclose(file["angle"], points["angle"])):
+            raise ValueError("it was sampled at other points, by another version of alsph")
         samples = len(file["time"])
         for name, values in (("pressure_coefficient", pressure_coefficient), ("time", time)):
             file[name].resize(samples + len(values), axis=0)

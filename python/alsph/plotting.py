@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from alsph.ledger import Ledger
     from alsph.measures import Profile
     from alsph.results import PressureCoefficient, Run
+    from alsph.surface import Surface
 
 PIXELS_PER_SPACING = 2
 LARGEST_VIEW = 20_000  # spacings that a picture is wide or high at most
@@ -89,6 +91,15 @@ def field_style(name: str) -> FieldStyle:
     if name not in FIELDS:
         raise ConfigError(f"unknown field '{name}'; {suggest(name, FIELDS)}")
     return FIELDS[name]
+
+
+def remark(figure: Figure, text: str) -> None:
+    """Write a remark below a figure."""
+    if text:
+        width = int(figure.get_size_inches()[0] * 17)  # letters in a line
+        figure.supxlabel(
+            textwrap.fill(text, width), fontsize="x-small", color="0.3", x=0.01, ha="left", parse_math=False
+        )
 
 
 def field(
@@ -316,14 +327,18 @@ def _robust_limits(axes: Axes, time: FloatArray, values: FloatArray) -> None:
 def pressure_coefficient(
     coefficient: PressureCoefficient, reference: tuple[FloatArray, FloatArray] | None = None
 ) -> Figure:
-    """Mean C_p over the angle from the front stagnation point, both sides folded on 0 to 180 degrees.
+    """Mean C_p of both sides: of a body with a chord over x/c and the distance along the surface, suction up.
+
+    Of a cylinder it is drawn over the angle from the front stagnation point, folded on 0 to 180 degrees.
 
     Parameters
     ----------
     coefficient : PressureCoefficient
-    reference : (theta, value), optional
-        A curve to compare with, in degrees from the front.
+    reference : (abscissa, value), optional
+        A curve to compare with, over degrees from the front or x/c.
     """
+    if coefficient.surface and coefficient.surface.chord is not None:
+        return _pressure_over_chord(coefficient, coefficient.surface, coefficient.surface.chord, reference)
     figure = Figure(figsize=(7, 4.5), layout="constrained")
     axes = figure.subplots()
     theta = np.mod(coefficient.theta, 360.0)
@@ -338,15 +353,50 @@ def pressure_coefficient(
         axes.fill_between(angle, mean - deviation, mean + deviation, color=style[:2], alpha=0.15, lw=0)
     if reference is not None:
         axes.plot(*reference, "k:", lw=1.5, label="reference")
+    axes.set(xlabel=r"$\theta$ from the front stagnation point [degrees]", ylabel="$C_p$", xlim=(0, 180))
+    axes.set_title(_samples(coefficient), fontsize="medium")
+    axes.set_xticks(range(0, 181, 30))
+    _finish_pressure(axes, coefficient)
+    return figure
+
+
+def _pressure_over_chord(
+    coefficient: PressureCoefficient,
+    surface: Surface,
+    chord: FloatArray,
+    reference: tuple[FloatArray, FloatArray] | None,
+) -> Figure:
+    figure = Figure(figsize=(10, 4.5), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    several = surface.part.max() > 0
+    for part in np.unique(surface.part):
+        for index, (side, name, line) in enumerate(((1, "upper side", "-"), (-1, "lower side", "--"))):
+            chosen = (surface.part == part) & (surface.side == side)
+            mean, deviation = coefficient.mean[chosen], coefficient.deviation[chosen]
+            colour = f"C{int(part) % 10}" if several else f"C{index}"
+            for axes, abscissa in ((left, chord), (right, surface.arc)):
+                axes.plot(abscissa[chosen], mean, line, color=colour, label=f"{part:.0f}, {name}" if several else name)
+                axes.fill_between(abscissa[chosen], mean - deviation, mean + deviation, color=colour, alpha=0.15, lw=0)
+    if reference is not None:
+        left.plot(*reference, "k:", lw=1.5, label="reference")
+    left.set(xlabel="$x/c$", ylabel="$C_p$, suction up")
+    right.set(xlabel="distance along the surface from the leading edge, $s/D$")
+    left.invert_yaxis()  # of both
+    figure.suptitle(_samples(coefficient), fontsize="medium")
+    for axes in (left, right):
+        _finish_pressure(axes, coefficient)
+    return figure
+
+
+def _samples(coefficient: PressureCoefficient) -> str:
+    return f"mean of {coefficient.samples} samples, band: ± 1 standard deviation"
+
+
+def _finish_pressure(axes: Axes, coefficient: PressureCoefficient) -> None:
     if coefficient.samples == 0:
         axes.text(0.5, 0.5, "no samples in the averaging window", ha="center", transform=axes.transAxes)
-    axes.set(xlabel=r"$\theta$ from the front stagnation point [degrees]", ylabel="$C_p$", xlim=(0, 180))
-    still = f", {DEVELOPING}" if coefficient.developing else ""
-    axes.set_title(f"mean of {coefficient.samples} samples{still}, band: ± 1 standard deviation", fontsize="medium")
-    axes.set_xticks(range(0, 181, 30))
     axes.grid(alpha=0.3)
     axes.legend()
-    return figure
 
 
 def ledger(run: Run) -> Figure:

@@ -58,6 +58,14 @@ class Reporter:
             with suppress(OSError, ValueError):  # a terminal that has been closed
                 self._live.stop()
 
+    def say(self, line: str) -> None:
+        """Print a line."""
+        if self._enabled:
+            try:
+                self._console.print(line, markup=False, soft_wrap=True)
+            except (OSError, ValueError, SystemExit):
+                self._enabled = False
+
     def update(self, rows: dict[str, Any]) -> None:
         """Report new rows of the history; where nobody listens any more, say nothing from then on."""
         if self._enabled and len(rows["step"]):
@@ -87,7 +95,7 @@ def physics_line(rows: dict[str, Any]) -> str:
     last = {name: values[-1] for name, values in rows.items()}
     parts = [
         f"t* {last['time']:.3f}",
-        f"{last['iterations']:d} iter{'' if last['converged'] else ' (cap)'}",
+        f"{last['iterations']:d} iter",
         f"max|∇·u| {last['divergence_max']:.1e}",
     ]
     if "drag_coefficient" in last:

@@ -5,7 +5,7 @@ import math
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from alsph.durable import viewing
 from alsph.errors import RunFolderError
 from alsph.geometry import FloatArray, Kind
 from alsph.memory import free_memory
+from alsph.surface import Surface
 from alsph.text import contents
 
 LARGEST_EXPANSION = 1032
@@ -219,6 +220,21 @@ def surface(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
             raise ValueError(f"shapes {angle.shape}, {time.shape}, {samples.shape} do not match")
     count = min(len(time), len(samples))
     return angle, time[:count], samples[:count]
+
+
+def surface_points(path: Path) -> Surface | None:
+    """Read the geometry of the points in ``surface.h5``; None if there is no file yet or it is of an older version."""
+    if not path.exists():
+        return None
+    with _opened(path) as file:
+        if "position" not in file:
+            return None
+        names = [field.name for field in fields(Surface) if field.name in file]
+        arrays = {name: np.asarray(sound(file, name), float) for name in names}
+        for name, values in arrays.items():
+            if values.shape != (arrays["angle"].size, 2)[: 2 if name in ("position", "normal") else 1]:
+                raise ValueError(f"{name} of shape {values.shape} does not match {arrays['angle'].size} points")
+        return Surface(**arrays)
 
 
 def snapshot_times(path: Path) -> FloatArray:

@@ -2,7 +2,7 @@
 
 import html
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from alsph import analysis, plotting, reading, sampling
+from alsph import analysis, plotting, reading, remarks, sampling
 from alsph.analysis import Estimate, Window
 from alsph.config import Config
 from alsph.errors import ConfigError, RunFolderError
@@ -22,12 +22,13 @@ from alsph.measures import Measure, Profile
 from alsph.parameters import choose
 from alsph.progress import duration
 from alsph.reading import Snapshot
+from alsph.surface import Surface
 from alsph.text import in_figure, printable, shown
 
 
 @dataclass(frozen=True)
 class Load:
-    """A force coefficient, F / (½ρU²D), over the averaging window.
+    """A coefficient of a force, F / (½ρU²D), or moment, M / (½ρU²c²), over the averaging window.
 
     Attributes
     ----------
@@ -74,6 +75,8 @@ class PressureCoefficient:
         Number of samples in the window.
     developing : bool
         Whether the flow still develops in the window.
+    surface : Surface, optional
+        Where the samples were taken: x/c, side, arc length, normal and length of each piece of the surface, shape (m,).
     """
 
     theta: FloatArray
@@ -81,6 +84,25 @@ class PressureCoefficient:
     deviation: FloatArray
     samples: int
     developing: bool = False
+    surface: Surface | None = None
+
+    def force(self, part: int | None = None) -> FloatArray:
+        """Pressure parts of the mean drag and lift coefficient, −∮ C_p n ds: a check of the recorded ones.
+
+        Parameters
+        ----------
+        part : int, optional
+            Number of the closed curve; all of them if None.
+
+        Returns
+        -------
+        ndarray, shape (2,)
+            NaN where there are no samples, or an older version has not written where they were taken.
+        """
+        if self.surface is None:
+            return np.full(2, np.nan)
+        chosen = self.mean if part is None else np.where(self.surface.part == part, self.mean, 0.0)
+        return -self.surface.integral(chosen)
 
 
 class Run:
@@ -224,7 +246,9 @@ class Run:
 
     def load(self, axis: str, body: str | None = None) -> Load:
         """Force coefficient of a body along an axis over the averaging window (arguments as in :meth:`coefficient`)."""
-        total, pressure, viscous = (self.coefficient(axis, part, body) for part in ("total", "pressure", "viscous"))
+        return self._load(*(self.coefficient(axis, part, body) for part in ("total", "pressure", "viscous")))
+
+    def _load(self, total: FloatArray, pressure: FloatArray, viscous: FloatArray) -> Load:
         return Load(
             mean=self._measure(analysis.mean, total),
             rms=self._measure(analysis.root_mean_square, total),
@@ -232,6 +256,51 @@ class Run:
             pressure=self._measure(analysis.mean, pressure),
             viscous=self._measure(analysis.mean, viscous),
         )
+
+    def moment_coefficient(
+        self, part: str = "total", body: str | None = None, about: Sequence[float] | None = None
+    ) -> FloatArray:
+        """Pitching moment coefficient of a body in every step, M / (½ρU²c²), nose up positive, in 2-D.
+
+        The flow comes from the left, so that nose up is clockwise. c is the case's :attr:`~alsph.cases.Case.chord`.
+
+        Parameters
+        ----------
+        part : {"total", "pressure", "viscous"}
+        body : str, optional
+            Name of the body; all of those that drag and lift are of, if None.
+        about : (x, y), optional
+            Point that the moment is about [D]; if None, that of the case: a quarter of the chord behind the leading
+            edge of a ``body``, the centre of a cylinder.
+
+        Returns
+        -------
+        ndarray, shape (steps,)
+            NaN if the run has no body.
+
+        Raises
+        ------
+        ConfigError
+            If there is no such part or body.
+        """
+        case = self.config.case
+        choose("part", part, ("total", "pressure", "viscous"))
+        if body is not None:
+            choose("body", body, self.bodies or [known["name"] for known in case.bodies()])
+        point = case.moment_point if about is None else np.array(about, float)
+        centres = {each["name"]: each["center"] for each in case.bodies()}
+        missing = np.full(len(self.history["time"]), np.nan)
+        moment = np.zeros_like(missing)
+        for name in [body] if body else case.coefficient_bodies or self.bodies[:1]:
+            for each in ("pressure", "viscous") if part == "total" else (part,):
+                moment += 2.0 * self.history.get(f"{name}_{each}_torque", missing)
+            arm = np.subtract(centres.get(name, np.nan), point)
+            moment += arm[0] * self.coefficient("y", part, name) - arm[1] * self.coefficient("x", part, name)
+        return -moment / case.chord**2
+
+    def moment(self, about: Sequence[float] | None = None, body: str | None = None) -> Load:
+        """Pitching moment coefficient over the averaging window (arguments as in :meth:`moment_coefficient`)."""
+        return self._load(*(self.moment_coefficient(part, body, about) for part in ("total", "pressure", "viscous")))
 
     @cached_property
     def strouhal(self) -> Estimate:
@@ -250,7 +319,11 @@ class Run:
         angle, time, samples = reading.surface(self.path / "surface.h5")
         mean, deviation = analysis.mean_profile(time, samples, self.window)
         inside = np.count_nonzero((time >= self.window.start) & (time <= self.window.end))
-        return PressureCoefficient(angle, mean, deviation, int(inside), self.window.developing)
+        surface = reading.surface_points(self.path / "surface.h5")
+        if surface is None:  # of an older version, be it at the same points
+            case = self.config.case.surface_points()
+            surface = case if case and np.array_equal(case.angle, angle) else None
+        return PressureCoefficient(angle, mean, deviation, int(inside), self.window.developing, surface)
 
     def _measure(self, measure: Callable[[FloatArray, FloatArray, Window], Estimate], values: FloatArray) -> Estimate:
         if np.isnan(values).all():
@@ -312,6 +385,14 @@ class Run:
         fields = snapshot.position[fluid], snapshot.velocity[fluid], snapshot.pressure[fluid]
         return sampling.control_volume(*fields, box, self.spacing, 1.0, viscosity)
 
+    @cached_property
+    def remarks(self) -> list[str]:
+        """What is to be borne in mind with the results, each as ``keyword: what it is; what explains it``.
+
+        What resolution, method and domain cannot carry (:meth:`alsph.cases.Case.remarks`), and what came of the run.
+        """
+        return [*remarks.outcome(self), *self.config.case.remarks()]
+
     def summary(self) -> dict[str, Any]:
         """Return the run's main results by name, its measures each followed by the reference value where there is one.
 
@@ -327,7 +408,7 @@ class Run:
             "computing time": duration(self.info.get("seconds", 0)),
             "time reached, tU/D": Estimate(self.history["time"][-1] if steps else 0.0),
             "steps": steps,
-            "steps ended by the iteration cap, %": self._capped(),
+            "iterations of a step": self._iterations(),
             "averaged from tU/D": Estimate(self.window.start),
             "averaged to tU/D": Estimate(self.window.end),
             "averaging rule": self.window.rule,
@@ -335,25 +416,28 @@ class Run:
         if self.body:
             results["shedding periods"] = self.window.periods
         results["mean velocity divergence, |∇·u| D/U"] = self.divergence.mean
+        results["largest velocity divergence, |∇·u| D/U"] = self.divergence.max
         for measure in self.measures:
             value = measure.value
             results[measure.name] = value if isinstance(value, Estimate) else Estimate(value)
             if np.abs(measure.reference) > 0:
                 results[f"{measure.name}, reference"] = Estimate(measure.reference)
+        results |= {f"remark {number}": remark for number, remark in enumerate(self.remarks, 1)}
         return {name: value for name, value in results.items() if value != ""}
 
-    def _capped(self) -> Estimate:
-        """Percentage of the steps that the iteration cap ended, not the tolerance."""
-        converged = self.history.get("converged", np.empty(0))
-        return Estimate(100 * (1 - converged.mean()) if converged.size else np.nan, note="no steps recorded yet")
+    def _iterations(self) -> str:
+        """How many iterations a step took, and how many it may take, in words."""
+        case, iterations = self.config.case, self.history.get("iterations", np.empty(0))
+        taken = f"{iterations.mean():.3g} of at most " if iterations.size else "at most "
+        return f"{taken}{case.max_iterations}, then {case.projection_sweeps} projection sweeps"
 
     def plot_forces(self, path: str | Path | None = None, body: str | None = None) -> Figure:
         """Figure of drag and lift over time with their parts and the averaging window; saved if `path` is given."""
-        return _saved(plotting.forces(self, body), path)
+        return self._saved(plotting.forces(self, body), path)
 
     def plot_spectrum(self, path: str | Path | None = None, body: str | None = None) -> Figure:
         """Figure of the spectra of drag and lift in the averaging window; saved if `path` is given."""
-        return _saved(plotting.spectrum({in_figure(self.path.name): self}, body), path)
+        return self._saved(plotting.spectrum({in_figure(self.path.name): self}, body), path)
 
     def plot_field(
         self,
@@ -379,23 +463,33 @@ class Run:
             Part of the plane to show [D]; all of it if None.
         """
         plotting.field_style(name)
-        return _saved(plotting.field(self.snapshot(time), name, self.spacing, limit=limit, view=view), path)
+        return self._saved(plotting.field(self.snapshot(time), name, self.spacing, limit=limit, view=view), path)
 
     def plot_pressure_coefficient(
         self, path: str | Path | None = None, reference: tuple[FloatArray, FloatArray] | None = None
     ) -> Figure:
-        """Figure of C_p(θ) and a reference curve (θ in degrees, C_p); saved if `path` is given.
+        """Figure of C_p and a reference curve (θ in degrees, or x/c, and C_p); saved if `path` is given.
 
         Without a `reference`, that of :attr:`profiles` is drawn where there is one.
         """
         if reference is None:
             known = (profile.reference for profile in self.profiles if profile.name == "pressure coefficient")
             reference = next(known, None)
-        return _saved(plotting.pressure_coefficient(self.pressure_coefficient, reference), path)
+        return self._saved(plotting.pressure_coefficient(self.pressure_coefficient, reference), path)
+
+    def plot_profile(self, profile: Profile, path: str | Path | None = None) -> Figure:
+        """Figure of one of :attr:`profiles` beside its reference; saved if `path` is given."""
+        return self._saved(plotting.profile({"computed": profile}), path)
 
     def plot_ledger(self, path: str | Path | None = None) -> Figure:
         """Figure of divergence, iterations, time step, volume, mass and energy over time; saved if `path` is given."""
-        return _saved(plotting.ledger(self), path)
+        return self._saved(plotting.ledger(self), path)
+
+    def _saved(self, figure: Figure, path: str | Path | None) -> Figure:
+        plotting.remark(figure, remarks.brief(self.remarks))
+        if path is not None:
+            figure.savefig(path)
+        return figure
 
     def __repr__(self) -> str:
         """Name the folder, the case, the status and the time reached."""
@@ -406,9 +500,3 @@ class Run:
     def _repr_html_(self) -> str:
         rows = ((html.escape(name), html.escape(printable(str(value)))) for name, value in self.summary().items())
         return "<table>" + "".join(f"<tr><th>{name}</th><td>{value}</td></tr>" for name, value in rows) + "</table>"
-
-
-def _saved(figure: Figure, path: str | Path | None) -> Figure:
-    if path is not None:
-        plotting.save(figure, path)
-    return figure

@@ -260,7 +260,12 @@ class _Driver:
         self.deadline = control.deadline
         verb = "resumed" if self.simulation.step else "started"
         self.folder.log(f"{verb} at {self.where}: {describe(self.provenance)}")
+        remarks = self.config.case.remarks()
+        for remark in remarks:
+            self.folder.log(f"remark: {remark}")
         with Reporter(self.config.until, self.simulation.time, enabled=control.progress) as reporter:
+            for remark in remarks:
+                reporter.say(f"remark: {remark}")
             try:
                 with _interruptible(control.stop) as signals:
                     finished = self._work(reporter, control)
@@ -328,7 +333,7 @@ class _Driver:
     def _sample_surface(self, rows: dict[str, Any]) -> None:
         """Sample C_p = (p − p_0) / (½ρU²), with p_0 the pressure at the inlet."""
         if self.surface:
-            pressure = self.simulation.sample(self.surface[1])["pressure"]
+            pressure = self.simulation.sample(self.surface.position)["pressure"]
             self.samples.append((self.simulation.time, 2 * (pressure - rows["inlet_pressure"][-1])))
 
     def _output(self) -> None:
@@ -346,7 +351,7 @@ class _Driver:
         self._flush()
         if self.samples and self.surface:
             times, samples = (np.array(values) for values in zip(*self.samples, strict=True))
-            self.folder.append_surface(times, self.surface[0], samples)
+            self.folder.append_surface(times, self.surface.angle, samples, self.surface.arrays())
             self.samples = []
         if self.written != self.simulation.step:  # else it is there, and must not displace the one before
             state = self.simulation.state()

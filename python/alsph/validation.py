@@ -16,6 +16,7 @@ from alsph.durable import write_text
 from alsph.errors import ConfigError, SolverError
 from alsph.measures import Measure
 from alsph.progress import duration
+from alsph.remarks import keywords
 from alsph.results import Run
 from alsph.run import Control, complete
 from alsph.tables import markdown
@@ -182,6 +183,7 @@ class Report:
                 run.status,
                 duration(run.info.get("seconds", 0)),
                 f"{run.info.get('versions', {}).get('alsph', '?')}, commit {run.info.get('commit') or '?'}",
+                keywords(run.remarks),
             )
             for run in self.runs
         ]
@@ -193,7 +195,7 @@ class Report:
                 "Errors are relative, those of a zero reference absolute.",
                 markdown([*HEADER, "source"], [(*row.cells, row.measure.source) for row in self.rows]),
                 *(f"![{title}]({file})" for file, title in self.figures.items()),
-                markdown(["run", "status", "time", "alsph"], facts) + "\n",
+                markdown(["run", "status", "time", "alsph", "remarks"], facts) + "\n",
             ]
         )
 

@@ -51,6 +51,11 @@ class BackwardFacingStep(Case):
         return 20.0 + 0.5 * self.reynolds
 
     @property
+    def validated(self) -> tuple[float, float, int]:
+        """What has been compared with an independent solution."""
+        return (100, 389, 10)
+
+    @property
     def inlet_height(self) -> float:
         """Height h of the inlet channel [D]."""
         return 1.0 / (self.expansion - 1.0)

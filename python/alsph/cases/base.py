@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
+from alsph import remarks
 from alsph.errors import ConfigError
 from alsph.geometry import FloatArray, Kind, Problem
 from alsph.measures import Measure, Profile
@@ -21,6 +22,7 @@ from alsph.parameters import Parameters
 if TYPE_CHECKING:
     from alsph.results import Run
     from alsph.simulation import Simulation
+    from alsph.surface import Surface
 
 SUPPORT = {"quintic_spline": 3, "wendland_c2": 2, "wendland_c4": 2}
 """Support radius of each kernel in smoothing lengths."""
@@ -178,14 +180,59 @@ class Case(Parameters):
         """Whether the case has a rule of its own for the inflow."""
         return type(self).inflow is not Case.inflow
 
-    def surface_points(self) -> tuple[FloatArray, FloatArray] | None:
-        """Return ``angle`` (m,) [degrees from the front] and ``position`` (m, d) of the C_p samples."""
+    def surface_points(self) -> Surface | None:
+        """Return where the surface pressure is sampled."""
         return None
+
+    @property
+    def chord(self) -> float:
+        """Length c that moment coefficients are formed with [D]."""
+        return 1.0
+
+    @property
+    def moment_point(self) -> FloatArray:
+        """Point (2,) that moments are taken about if no other is given [D]: the centre of the first body."""
+        centres = [body["center"] for body in self.bodies()] or [[np.nan, np.nan]]
+        return np.array(centres[0], float)
 
     def fluid_volume(self) -> float:
         """Return the volume of the space that the fluid fills [D^d]: that of the cells it is put in at first."""
         count = np.count_nonzero(self.particles()["kind"] == Kind.FLUID)
         return float(count * self.particle_spacing**self.space_dimensions)
+
+    @property
+    def validated(self) -> tuple[float, float, int] | None:
+        """Least and largest Re and least D/Δx that have been compared with the results of others (docs/results.md).
+
+        None where each run is compared with an exact solution of its own.
+        """
+        return None
+
+    @property
+    def cell_reynolds(self) -> float:
+        """Cell Reynolds number UΔx/ν [-]."""
+        return self.particle_spacing / self.kinematic_viscosity
+
+    @property
+    def boundary_layer(self) -> float:
+        """About how thick the thinnest boundary layer is that matters [D]; infinite without any."""
+        return math.inf
+
+    def scales(self) -> dict[str, float]:
+        """Return what the resolution must carry: lengths of the flow in Δx, and the cell Reynolds number, by name."""
+        scales = {"cell Reynolds number, UΔx/ν": self.cell_reynolds}
+        if math.isfinite(self.boundary_layer):
+            scales["thickness of the boundary layer, Δx"] = self.boundary_layer / self.particle_spacing
+        return scales
+
+    def remarks(self) -> list[str]:
+        """Return what this resolution, method and domain cannot carry, each as ``keyword: what it is; what to do``."""
+        known = self.validated
+        return [
+            *remarks.boundary_layer(self.boundary_layer, self.particle_spacing),
+            *(remarks.validated(self.reynolds, self.resolution, self.cell_reynolds, known) if known else []),
+            *remarks.kernel(self.kernel, self.smoothing_ratio),
+        ]
 
     def measures(self, run: Run) -> list[Measure]:
         """Return what a run of this case is judged by."""
@@ -379,19 +426,15 @@ class Case(Parameters):
         return {name: limits[name] / self.particle_spacing for name in ("penalty", "viscous", "body_force")}
 
     def time_step_warning(self) -> str | None:
-        """Return a warning if the time step lies above the stability law, which it names."""
+        """Return a warning if steps are to be taken above the stability law, which it names."""
         limits = self.time_step_limits()
         binding = min(limits, key=lambda name: limits[name])
-        if self.time_step <= limits[binding]:
+        if self.time_step <= limits[binding] or (self.adaptive_time_step and self.adaptive_until is None):
             return None
-        remedy = (
-            "adaptive_time_step takes smaller steps"
-            if self.adaptive_time_step and self.adaptive_until is None
-            else "expect divergence: lower time_step or switch adaptive_time_step on"
-        )
         return (
             f"time_step = {self.time_step:.4g} lies above the {binding.replace('_', ' ')} stability limit "
-            f"{limits[binding]:.4g} (ΔtU/Δx at u_max = {self.velocity_max:g} U); {remedy}"
+            f"{limits[binding]:.4g} (ΔtU/Δx at u_max = {self.velocity_max:g} U); "
+            "expect divergence: lower time_step or switch adaptive_time_step on"
         )
 
     def whole_cells(self, name: str, length: float) -> int:

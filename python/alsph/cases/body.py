@@ -13,11 +13,13 @@ import shapely
 from pydantic import Field, field_validator, model_validator
 from shapely import affinity
 
+from alsph import remarks
 from alsph.cases.channel import Channel
 from alsph.geometry import FloatArray, Solid
 from alsph.measures import Measure
 from alsph.outline import Outline
 from alsph.packing import pack
+from alsph.surface import Surface, along, edges
 from alsph.thin import THINNEST, carried, solid, thickness
 
 if TYPE_CHECKING:
@@ -30,7 +32,8 @@ class Body(Channel):
     D is the side of the square, the chord of the airfoil, or the unit of the file's lengths. A file holds points, two
     numbers a line, in any of the usual orders and forms; several closed curves are several bodies. The centroid, that
     of all of them together, lies at (upstream, 0). The solid particles follow the surface. What is thinner than 2 Δx,
-    such as a sharp trailing edge, is cut off (:attr:`carried`); a body of which that leaves nothing is refused.
+    such as a sharp trailing edge, is cut off (:attr:`carried`); a body of which that leaves nothing is refused. Forces
+    are formed with D; moments with the chord c, the body's extent along x before it is turned, about the point at c/4.
     """
 
     name: ClassVar[str] = "body"
@@ -128,17 +131,63 @@ class Body(Channel):
         bodies = shapely.union_all(self.carried)
         return np.asarray(self.centre + pack(cells - self.centre, bodies, position, self.particle_spacing))
 
-    def measures(self, run: Run) -> list[Measure]:
-        """Return the forces, the mean lift among them, which a body at an angle has, and the Strouhal number."""
-        return [*super().measures(run), Measure("mean lift coefficient", run.lift.mean)]
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Left, bottom, right and top of the outline, relative to its centroid [D]."""
+        left, bottom, right, top = self.outline.bounds
+        return left, bottom, right, top
 
-    def surface_points(self) -> tuple[FloatArray, FloatArray]:
-        """Return 144 points evenly along the surfaces; their angles are seen from the centroid."""
-        share = np.arange(144) / 144
-        points = shapely.get_coordinates(shapely.line_interpolate_point(self.outline.boundary, share, normalized=True))
-        angle = np.degrees(np.arctan2(points[:, 1], -points[:, 0])).round(9) % 360.0
-        order = np.argsort(angle, kind="stable")
-        return angle[order], self.centre + points[order]
+    @property
+    def size(self) -> float:
+        """Larger extent of the body, of the smallest one if there are several [D]."""
+        lower, upper = np.split(shapely.bounds(shapely.get_parts(self.outline)), 2, axis=1)
+        return float((upper - lower).max(axis=1).min())
+
+    def scales(self) -> dict[str, float]:
+        """Return those of the flow and the thickness of the body's thinnest part."""
+        thinnest = remarks.thinnest(self.outline) / self.particle_spacing
+        return super().scales() | {"thickness of the thinnest part, Δx": thinnest}
+
+    def remarks(self) -> list[str]:
+        """Return what is to be said of the resolution, the method, the channel and parts of the body."""
+        unknown = "not validated: flow past this body; it has not been compared with the results of others"
+        thin = [
+            remark
+            for outline, left in zip(self.outlines, self.carried, strict=True)
+            for remark in remarks.thin(outline, left, thickness(left), self.particle_spacing)
+        ]
+        return [*super().remarks(), *thin, unknown]
+
+    def measures(self, run: Run) -> list[Measure]:
+        """Return the forces, among them what a body at an angle has: mean lift and moment; and the Strouhal number."""
+        return [
+            *super().measures(run),
+            Measure("mean lift coefficient", run.lift.mean),
+            Measure("mean pitching moment coefficient about c/4", run.moment().mean),
+        ]
+
+    @property
+    def chord(self) -> float:
+        """Extent c along the abscissa before the body is turned [D]."""
+        left, _, right, _ = self._upright.bounds
+        return float(right - left)
+
+    @property
+    def moment_point(self) -> FloatArray:
+        """The quarter-chord point (2,) [D]: c/4 behind the foremost point, on the line to the rearmost one."""
+        front, rear = edges(self._upright)
+        quarter = affinity.rotate(shapely.Point(0.75 * front + 0.25 * rear), -self.angle_of_attack, origin=(0, 0))
+        return np.array([quarter.x, quarter.y]) + self.centre
+
+    @property
+    def _upright(self) -> shapely.Polygon:
+        return affinity.rotate(self.outline, self.angle_of_attack, origin=(0, 0))
+
+    def surface_points(self) -> Surface:
+        """Return the pieces of the bodies as carried, from the leading edge over the upper side and back below."""
+        left, _, right, _ = self._upright.bounds
+        parts = shapely.MultiPolygon([part for body in self.carried for part in shapely.get_parts(body)])
+        return along(parts, self.angle_of_attack, (left, right)).moved(self.centre)
 
 
 def _square_cylinder() -> shapely.Polygon:

@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 from pydantic import Field
 
-from alsph import reference, sampling
+from alsph import reference, remarks, sampling
 from alsph.cases.base import Case
 from alsph.geometry import FloatArray, Kind, cells, join, particles, walls
 from alsph.measures import Measure, Profile
@@ -40,6 +40,16 @@ class Cavity(Case):
     def default_until(self) -> float:
         """Time by which the flow is steady; it grows with the Reynolds number."""
         return 20.0 + self.reynolds / 25
+
+    @property
+    def validated(self) -> tuple[float, float, int]:
+        """What has been compared with an independent solution."""
+        return (100, 1000, 25)
+
+    @property
+    def boundary_layer(self) -> float:
+        """As in the flow past a cylinder of the cavity's size: the vortex in it fills it [D]."""
+        return remarks.LAYER * math.sqrt(self.kinematic_viscosity)
 
     def domain(self) -> dict[str, Any]:
         """Return the cavity; solid particles close all sides."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
+from alsph import remarks
 from alsph.cases.base import Case
 from alsph.geometry import FloatArray, Kind, Solid, cell_centres, join, lattice, particles, symmetric_centres
 from alsph.measures import Measure
@@ -76,6 +77,27 @@ class Channel(Case):
     @abstractmethod
     def fluid(self, cells: FloatArray) -> FloatArray:
         """Return the positions (m, 2) of the fluid, given the cell centres (n, 2) of the whole channel."""
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Left, bottom, right and top of the body, relative to its centre [D]."""
+        return -0.5, -0.5, 0.5, 0.5
+
+    @property
+    def size(self) -> float:
+        """Larger extent of the body, of the smallest one if there are several [D]."""
+        return 1.0
+
+    @property
+    def boundary_layer(self) -> float:
+        """That at the front of a cylinder of the body's larger extent [D]."""
+        return remarks.LAYER * math.sqrt(self.kinematic_viscosity * self.size)
+
+    def remarks(self) -> list[str]:
+        """Return what is to be said of the resolution, the method and the channel."""
+        _, bottom, right, top = self.bounds
+        behind = self.length - self.upstream - right
+        return [*super().remarks(), *remarks.channel(top - bottom, self.upstream, behind, self.height)]
 
     @property
     def default_until(self) -> float:

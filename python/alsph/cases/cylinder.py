@@ -12,6 +12,7 @@ from alsph.cases.channel import Channel
 from alsph.geometry import FloatArray, Solid, cylinder_rings
 from alsph.measures import Measure, Profile
 from alsph.reference import Reference
+from alsph.surface import Surface, circle
 
 if TYPE_CHECKING:
     from alsph.results import Run
@@ -39,6 +40,11 @@ class Cylinder(Channel):
         "pressure coefficient",
     )
 
+    @property
+    def validated(self) -> tuple[float, float, int]:
+        """What has been compared with an independent solution."""
+        return (100, 300, 10)
+
     def solids(self) -> list[Solid]:
         """Return concentric rings."""
         return [cylinder_rings(RADIUS, self.particle_spacing, self.support_layers)]
@@ -47,11 +53,9 @@ class Cylinder(Channel):
         """Return the cells whose centres are at least a radius from that of the cylinder."""
         return np.asarray(cells[np.hypot(*(cells - self.centre).T) >= RADIUS])
 
-    def surface_points(self) -> tuple[FloatArray, FloatArray]:
+    def surface_points(self) -> Surface:
         """Return 72 points on the cylinder, every 5 degrees from the front stagnation point over the upper side."""
-        angle = np.arange(0.0, 360.0, 5.0)
-        radians = np.radians(angle)
-        return angle, self.centre + RADIUS * np.stack([-np.cos(radians), np.sin(radians)], axis=1)
+        return circle(RADIUS, 72).moved(self.centre)
 
     def fluid_volume(self) -> float:
         """Return the area of the channel without the cylinder."""

@@ -20,6 +20,7 @@ from alsph.io import RunFolder
 from alsph.measures import Profile
 from alsph.parameters import suggest
 from alsph.plotting import Curve
+from alsph.remarks import keywords, tally
 from alsph.results import Run
 from alsph.study.declaration import Figure, Point, Study, text
 from alsph.study.state import ENDED, RUNS, State, states
@@ -86,7 +87,8 @@ class Results:
         Folder of the tables and figures.
     rows : list of dict
         For each run its swept parameters, ``status``, ``time`` reached, ``folder``, and the results by name, numbers
-        with their uncertainty where they have one (:class:`alsph.analysis.Estimate`).
+        with their uncertainty where they have one (:class:`alsph.analysis.Estimate`); ``remarks`` are what there is to
+        be said of a run, its :attr:`alsph.Run.remarks` in short.
     references : list of dict
         Reference values of the same results, where they are known.
     states : list of State
@@ -114,11 +116,12 @@ class Results:
         references: list[dict[str, float]] = []
         for point, state in zip(points, reached, strict=True):
             folder = output / RUNS / point.name
-            results, known = _collected(folder, state)
+            results, known, remarked = _collected(folder, state)
             chosen = {name: results.get(name, Estimate(np.nan)) for name in study.collect} or results
             head = {"status": state.status, "time": state.time, "seconds": state.seconds}
             everything.append(results)
-            rows.append(dict(point.parameters) | head | chosen | {"folder": f"{RUNS}/{point.name}"})
+            tail = remarked | {"folder": f"{RUNS}/{point.name}"}
+            rows.append(dict(point.parameters) | head | chosen | tail)
             references.append(known)
         return cls(study, output / study.name, rows, references, reached, everything)
 
@@ -226,8 +229,12 @@ class Results:
     def draw(self) -> dict[str, Picture]:
         """Return the figures that can be drawn from the runs that have finished, by name."""
         draw = {"curves": self._curves, "profile": self._profiles, "fields": self._fields}
-        pictures = {figure.name: draw[figure.kind](figure) for figure in self.study.figures}
-        return {name: picture for name, picture in pictures.items() if picture is not None}
+        pictures = {}
+        for figure in self.study.figures:
+            if picture := draw[figure.kind](figure):
+                plotting.remark(picture, tally([self.rows[k].get("remarks", "") for k in self._chosen(figure)]))
+                pictures[figure.name] = picture
+        return pictures
 
     def _chosen(self, figure: Figure) -> list[int]:
         """Return the finished runs that a figure shows."""
@@ -317,10 +324,10 @@ def _time_of_largest_lift(run: Run) -> float | None:
     return float(times[np.argmax(at)])
 
 
-def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, float]]:
-    """Return the results of a finished run by name, and the reference values of those that have one."""
+def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, float], dict[str, str]]:
+    """Return the results of a finished run by name, the reference values of those that have one, and remarks."""
     if state.status != "finished":
-        return {}, {}
+        return {}, {}, {}
     try:
         run = Run(folder)
         results: dict[str, Any] = {measure.name: measure.value for measure in run.measures}
@@ -334,9 +341,10 @@ def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, fl
             float(np.mean(history["time_step"])) / run.spacing,
             float(np.mean(history["iterations"])),
         )
-        return results | {"averaging rule": run.window.rule} | dict(zip(OF_ALL_RUNS, numbers, strict=True)), known
+        results |= {"averaging rule": run.window.rule} | dict(zip(OF_ALL_RUNS, numbers, strict=True))
+        return results, known, {"remarks": keywords(run.remarks)} if run.remarks else {}
     except (AlsphError, KeyError) as error:
-        return {"message": str(error)}, {}
+        return {"message": str(error)}, {}, {}
 
 
 def _sorted(points: list[tuple[Any, Any]]) -> tuple[list[float], list[float], list[float]]:

@@ -1,0 +1,171 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from alsph import Run, remarks
+from alsph.cases import CASES, BackwardFacingStep, Body, Cavity, Cylinder, Poiseuille, TaylorGreen
+from shapely import affinity
+from synthetic import write_run
+
+
+def about(case):
+    return remarks.keywords(case.remarks())
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if name != "body"])
+def test_cases_as_they_come_need_no_remark(name):
+    assert CASES[name]().remarks() == []
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        *(Cylinder(reynolds=re, resolution=n) for re in (100, 200) for n in (20, 30)),
+        *(Cavity(reynolds=re, resolution=n) for re, n in ((100, 25), (400, 50), (1000, 50), (1000, 150))),
+        BackwardFacingStep(reynolds=389, resolution=10),
+        Poiseuille(resolution=10),
+        TaylorGreen(resolution=100),
+        TaylorGreen(dimensions=3, resolution=16),
+        Cylinder(height=60.0, upstream=30.0, length=90.0),
+        Poiseuille(kernel="wendland_c2", smoothing_ratio=1.75),
+    ],
+)
+def test_what_has_been_compared_with_references_needs_no_remark(case):
+    assert case.remarks() == []
+
+
+@pytest.mark.parametrize(
+    ("case", "keywords"),
+    [
+        (Cylinder(reynolds=200, resolution=10), "coarse"),
+        (Cylinder(reynolds=100, resolution=10), "coarse"),
+        (Cylinder(reynolds=1e5, resolution=8), "not resolved, not validated"),
+        (Cylinder(reynolds=1e7, resolution=8), "not resolved, not validated"),
+        (Cylinder(reynolds=1e5, resolution=400), "not validated"),
+        (Cylinder(reynolds=40), "not validated"),
+        (Cavity(reynolds=1e4, resolution=50), "coarse, not validated"),
+        (BackwardFacingStep(reynolds=800), "not validated"),
+        (TaylorGreen(dimensions=3, reynolds=1600), "not validated"),
+        (Poiseuille(kernel="wendland_c2", smoothing_ratio=1.0), "kernel"),
+        (Poiseuille(kernel="wendland_c4"), "kernel"),
+        (TaylorGreen(smoothing_ratio=1.1), "kernel"),
+        (Cylinder(length=3.0, height=13.0, upstream=1.5), "short channel"),
+        (Cylinder(height=5.0), "narrow channel"),
+        (Body(), "not validated"),
+        (Body(shape="naca0012"), "thin parts, thin body, not validated"),
+    ],
+)
+def test_what_cannot_be_carried_is_remarked_upon(case, keywords):
+    assert about(case) == keywords
+
+
+def test_remarks_tell_the_numbers_and_the_remedy():
+    (coarse,) = Cylinder(reynolds=200, resolution=10).remarks()
+    assert "0.849 Δx" in coarse and "resolution = 18 puts two particles into it" in coarse
+    assert Cylinder(reynolds=200, resolution=18).remarks() == []
+    layer = Cylinder(reynolds=1e5, resolution=8).remarks()[0]
+    assert layer.startswith("not resolved: boundary layer of 0.0304 Δx") and "resolution = 396" in layer
+    outlet, inlet = Cylinder(length=3.0, height=13.0, upstream=1.5).remarks()
+    assert "outlet 1 D behind" in outlet and "slows the stream there by about 11 %" in inlet
+    assert Cylinder(reynolds=250, resolution=10).scales() == pytest.approx(
+        {"cell Reynolds number, UΔx/ν": 25.0, "thickness of the boundary layer, Δx": 12 / math.sqrt(250)}
+    )
+
+
+def test_the_boundary_layer_is_that_of_the_bodys_own_size(tmp_path):
+    half = tmp_path / "half.txt"
+    half.write_text("-0.25 -0.25\n0.25 -0.25\n0.25 0.25\n-0.25 0.25\n")
+    assert Body(shape=str(half)).boundary_layer == pytest.approx(Cylinder().boundary_layer / math.sqrt(2))
+
+
+def test_of_several_bodies_the_smallest_has_the_thinnest_layer(monkeypatch):
+    two = shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(2, 0, 2.25, 0.25)])
+    monkeypatch.setattr(Body, "outline", two)
+    assert Body().boundary_layer == pytest.approx(0.5 * Cylinder().boundary_layer)
+
+
+ELLIPSE = affinity.scale(shapely.Point(0, 0).buffer(1, quad_segs=64), 0.5, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("shape", "thickness"),
+    [
+        (shapely.box(0, 0, 1, 1), 1.0),
+        (shapely.box(0, 0, 0.04, 1), 0.04),
+        (affinity.rotate(shapely.box(0, 0, 0.3, 1), 33), 0.3),
+        (shapely.Point(0, 0).buffer(0.5), 1.0),
+        (ELLIPSE, 0.4),
+        (shapely.box(0, 0, 1, 1) | shapely.box(1, 0.4, 2, 0.45), 0.05),
+        (shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(2, 0, 2.1, 1)]), 0.1),
+        (shapely.Polygon([(0, 0), (1, 0.1), (1, -0.1)]), 0.0),
+        (shapely.box(0, 0, 1e-3, 1e-3), 1e-3),
+    ],
+)
+def test_thickness_of_the_thinnest_part(shape, thickness):
+    assert remarks.thinnest(shape) == pytest.approx(thickness, rel=0.01, abs=2e-3 * thickness + 1e-4)
+
+
+def test_what_is_cut_off_a_body_and_thin_bodies_are_remarked_upon():
+    def said(resolution, **parameters):
+        case = Body(resolution=resolution, length=5.0, height=4.0, upstream=2.0, **parameters)
+        return [remark for remark in case.remarks() if remark.startswith("thin")]
+
+    cut, thin = said(20, shape="naca0012")
+    assert cut.startswith(
+        "thin parts: cut off, for they are thinner than 2 Δx: up to 0.41 D of tips, 33 % of the area;"
+    )
+    assert thin.startswith("thin body: 2.4 Δx at its thickest")
+    assert len(said(40, shape="naca0012")) == 2
+    (cut,) = said(80, shape="naca0012")
+    assert "thin parts" in cut
+    assert said(10) == said(8) == []
+
+
+def test_remarks_of_a_run(tmp_path):
+    run = Run(write_run(tmp_path / "run"))
+    assert remarks.keywords(run.remarks) == "coarse, narrow channel"
+    assert run.summary()["remark 1"] == run.remarks[0]
+    short = Run(tmp_path / "run")
+    short.window = replace(short.window, edges=short.window.edges[:5], periods=4)
+    assert remarks.outcome(short) == ["few periods: averaged over 4 of shedding; a longer run tells more"]
+    short.window = replace(short.window, settled=False, rule="shedding not periodic yet")
+    assert remarks.outcome(short) == ["not settled: shedding not periodic yet"]
+    short.window = replace(short.window, rule="still developing (drag changes by 2 %); later half of the periods")
+    assert remarks.outcome(short) == ["still developing: drag changes by 2 %; later half of the periods"]
+    info = tmp_path / "run" / "run.json"
+    info.write_text('{"status": "diverged", "retries": [{"step": 3, "time_step": 0.01}]}')
+    lines = (tmp_path / "run" / "history.csv").read_text().splitlines(keepends=True)
+    column = lines[0].split(",").index("cylinder_pressure_force_x")
+    cells = [line.rstrip("\n").split(",") for line in lines[1:3000]]
+    rows = [",".join([*row[:column], "-9", *row[column + 1 :]]) + "\n" for row in cells]
+    (tmp_path / "run" / "history.csv").write_text(lines[0] + "".join(rows))
+    broken = Run(tmp_path / "run")
+    assert remarks.keywords(broken.remarks).startswith("diverged, retried")
+    assert "unphysical" in remarks.keywords(broken.remarks)
+    assert broken.remarks[0].startswith("diverged: at tU/D = 29.9") and "of 60" in broken.remarks[0]
+
+
+def test_pictures_and_information_carry_the_remarks(tmp_path, alsph):
+    path = write_run(tmp_path / "run")
+    for figure in (Run(path).plot_forces(), Run(path).plot_field("pressure"), Run(path).plot_pressure_coefficient()):
+        assert "coarse: boundary layer of 0.849 Δx" in figure.get_supxlabel()
+        assert "puts two particles" not in figure.get_supxlabel()
+    assert "coarse: boundary layer of 0.849 Δx" in alsph("info", path)[1]
+    code, stdout, _ = alsph("describe", "cylinder", "--reynolds=1e5", "--resolution=8", "--no-probe")
+    assert (code, "remark" in stdout, "not resolved: boundary layer of 0.0304 Δx" in stdout) == (0, True, True)
+    assert "remark" not in alsph("describe", "cylinder", "--no-probe")[1]
+
+
+def test_a_figure_without_remarks_has_no_footer(tmp_path):
+    case = Cylinder(reynolds=200, resolution=20)
+    run = Run(write_run(tmp_path / "run", case))
+    assert run.remarks == [] and run.plot_forces().get_supxlabel() == ""
+    assert np.isfinite(run.drag.mean)
+
+
+def test_a_study_says_before_it_runs_what_its_cases_cannot_carry(tmp_path, alsph):
+    assert remarks.tally(["coarse, kernel", "", "coarse"]) == "coarse: 2 of 3 runs, kernel: 1 of 3 runs"
+    stdout = alsph("study", "run", "time-step", "--preset", "quick", "--dry-run", "-o", tmp_path)[1]
+    assert "remarks: coarse: 20 of 20 runs" in stdout

@@ -1,0 +1,193 @@
+import json
+
+import h5py
+import numpy as np
+import pytest
+import shapely
+from alsph import Run
+from alsph.cases import Body, Cylinder
+from alsph.config import Config, RunSettings
+from alsph.errors import RunFolderError
+from alsph.io import RunFolder
+from alsph.surface import along, circle, edges
+from shapely import affinity
+from synthetic import history, write_run
+
+SLOPE = np.array([0.3, -0.7])
+CAMBERED = "1 0.001\n0.7 0.09\n0.4 0.13\n0.1 0.08\n0 0\n0.1 0.01\n0.4 0.05\n0.7 0.04\n1 -0.001\n"
+ELLIPSE = affinity.scale(shapely.Point(0, 0).buffer(1, quad_segs=32), 0.5, 0.2)
+TWO = shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(2, 0.5, 3, 1)])
+
+
+@pytest.mark.parametrize("turn", [0.0, 12.0, -170.0])
+@pytest.mark.parametrize("shape", [Body().outline, Body(shape="naca0012").outline, ELLIPSE, TWO])
+def test_a_linear_pressure_pushes_with_its_gradient_times_the_area(shape, turn):
+    surface = along(affinity.rotate(shape, -turn, origin=(0, 0)), turn)
+    assert surface.integral(surface.position @ SLOPE + 3.0) == pytest.approx(shape.area * SLOPE, rel=1e-9)
+    assert surface.length.sum() == pytest.approx(shape.length)
+    assert np.hypot(*surface.normal.T) == pytest.approx(1)
+
+
+def test_a_circle_too():
+    surface = circle(0.5, 72)
+    assert surface.integral(surface.position @ SLOPE + 3.0) == pytest.approx(np.pi / 4 * SLOPE)
+
+
+@pytest.mark.parametrize("turn", [0.0, 10.0, -60.0])
+def test_sides_and_chord_turn_with_the_body(turn):
+    surface = Body(shape="naca0012", angle_of_attack=turn, height=6.0).surface_points()
+    outline = Body(shape="naca0012").outline
+    back = np.array(
+        [[np.cos(np.radians(turn)), np.sin(np.radians(turn))], [-np.sin(np.radians(turn)), np.cos(np.radians(turn))]]
+    )
+    upright = (surface.position - [4, 0]) @ back
+    assert (np.sign(upright[:, 1]) == surface.side).all()
+    assert surface.chord == pytest.approx(upright[:, 0] - outline.bounds[0])
+    for side, order in ((1, 1), (-1, -1)):
+        arc = surface.arc[surface.side == side]
+        assert (order * np.diff(arc) > 0).all() and arc.max() == pytest.approx(outline.length / 2, rel=0.01)
+
+
+def test_both_sides_of_a_symmetric_section_mirror():
+    surface = Body(shape="naca0012").surface_points()
+    upper, lower = surface.side > 0, surface.side < 0
+    assert surface.chord[upper] == pytest.approx(surface.chord[lower][::-1], abs=1e-12)
+    assert surface.position[upper] == pytest.approx(surface.position[lower][::-1] * [1, -1], abs=1e-12)
+
+
+def test_sides_of_a_cambered_section_are_told_by_the_edges_not_by_height(tmp_path):
+    path = tmp_path / "foil.txt"
+    path.write_text(CAMBERED)
+    case = Body(shape=str(path))
+    surface = case.surface_points()
+    inside = (surface.side < 0) & (surface.chord > 0.1) & (surface.chord < 0.9)
+    assert (surface.position[inside, 1] + case.outline.centroid.y > surface.position[0, 1]).any()  # above the nose
+    assert (surface.normal[inside, 1] < 0).all() and case.chord == pytest.approx(1)
+
+
+def test_faces_across_the_chord_are_parted_in_their_middle():
+    surface = Body().surface_points()
+    front = surface.chord == 0
+    assert front.sum() == 36 and (surface.side[front] == np.sign(surface.position[front, 1])).all()
+    assert [list(edge) for edge in edges(shapely.box(0, 0, 3, 1))] == [[0, 0.5], [3, 0.5]]
+
+
+def test_bodies_follow_each_other():
+    surface = along(TWO)
+    assert (np.diff(surface.part) >= 0).all() and set(surface.part) == {0, 1}
+    assert surface.chord.max() == pytest.approx(1) and surface.chord[surface.part == 0].max() == pytest.approx(1 / 3)
+
+
+def write_body(path, case, coefficient, *, geometry=True, torque=0.0):
+    """Write the run folder of a body with a constant pressure coefficient (m,) and torque."""
+    folder = RunFolder(path)
+    folder.create(Config(case, RunSettings(until=10.0)))
+    (path / "run.json").write_text(json.dumps({"status": "finished", "case": "body"}))
+    rows = history(10.0)
+    folder.append_history(rows | {"pressure_torque": np.full_like(rows["pressure_torque"], torque)}, ["body"])
+    surface = case.surface_points()
+    arrays = surface.arrays() if geometry else {}
+    for time in np.arange(0.0, 10.0, 0.5):
+        folder.append_surface(np.array([time]), surface.angle, coefficient(surface)[None], arrays)
+    return Run(path)
+
+
+def test_the_pressure_coefficient_of_a_body_and_its_force(tmp_path):
+    case = Body(shape="naca0012", angle_of_attack=10.0)
+    run = write_body(tmp_path / "run", case, lambda surface: surface.position @ SLOPE)
+    found = run.pressure_coefficient
+    assert found.force() == pytest.approx(-case.outline.area * SLOPE)
+    assert found.force(0) == pytest.approx(found.force()) and found.force(1) == pytest.approx([0, 0])
+    assert (found.surface.chord == case.surface_points().chord).all()
+
+
+def test_the_picture_has_suction_up_and_both_sides_over_the_chord(tmp_path):
+    case = Body(shape="naca0012", angle_of_attack=10.0)
+    run = write_body(
+        tmp_path / "run", case, lambda surface: np.where(surface.side > 0, -1.0, 0.5) * (1 - surface.chord)
+    )
+    over_chord, over_arc = run.plot_pressure_coefficient(tmp_path / "picture.png").axes
+    assert over_chord.yaxis_inverted() and over_arc.yaxis_inverted()
+    assert over_chord.get_xlabel() == "$x/c$" and "s/D" in over_arc.get_xlabel()
+    upper, lower = over_chord.lines
+    assert (upper.get_label(), lower.get_label()) == ("upper side", "lower side")
+    assert upper.get_ydata() == pytest.approx(upper.get_xdata() - 1, abs=1e-3)
+    assert lower.get_ydata() == pytest.approx(0.5 * (1 - lower.get_xdata()), abs=1e-3)
+    assert np.ptp(over_arc.lines[0].get_xdata()) == pytest.approx(1.02, abs=0.02)
+
+
+def test_folders_of_older_versions_have_no_geometry(tmp_path):
+    old = Run(write_run(tmp_path / "cylinder"))  # written without one, at the points that a cylinder still has
+    ideal = 1 - 2 * np.sin(np.radians(old.pressure_coefficient.theta)) ** 2
+    assert old.pressure_coefficient.force() == pytest.approx(
+        -circle(0.5, 72).integral(old.pressure_coefficient.mean), abs=1e-12
+    )
+    assert circle(0.5, 72).integral(ideal) == pytest.approx([0, 0], abs=1e-12)
+    foil = Body(shape="naca0012")
+    body = write_body(tmp_path / "body", foil, lambda surface: surface.position @ SLOPE, geometry=False)
+    with h5py.File(tmp_path / "body" / "surface.h5", "a") as file:
+        file["angle"][:] = file["angle"][:] + 0.5
+    assert np.isnan(body.pressure_coefficient.force()).all()
+    assert "degrees" in body.plot_pressure_coefficient().axes[0].get_xlabel()
+
+
+def test_samples_at_other_points_are_set_aside(tmp_path):
+    folder = RunFolder(tmp_path / "run")
+    folder.create(Config(Cylinder()))
+    folder.append_surface(np.array([0.1]), np.array([0.0, 90.0]), np.zeros((1, 2)))
+    with pytest.warns(RuntimeWarning, match="sampled at other points"):
+        folder.append_surface(np.array([0.2]), np.array([0.0, 80.0]), np.ones((1, 2)), {"part": np.zeros(2)})
+    assert (tmp_path / "run" / "surface.damaged.h5").exists()
+    with h5py.File(tmp_path / "run" / "surface.h5") as file:
+        assert file["time"][:].tolist() == [0.2] and "part" in file
+
+
+def test_damaged_geometry_is_refused(tmp_path):
+    run = write_body(tmp_path / "run", Body(), lambda surface: surface.side)
+    for name, values in (
+        ("normal", np.zeros((3, 2))),
+        ("position", np.zeros(144)),
+        ("side", np.zeros(())),
+        ("arc", None),
+    ):
+        with h5py.File(tmp_path / "run" / "surface.h5", "a") as file:
+            kept = file[name][()]
+            del file[name]
+            if values is not None:
+                file[name] = values
+        with pytest.raises(RunFolderError, match="surface.h5: unreadable"):
+            _ = Run(run.path).pressure_coefficient
+        with h5py.File(tmp_path / "run" / "surface.h5", "a") as file:
+            file.pop(name, None)
+            file[name] = kept
+    assert Run(run.path).pressure_coefficient.samples > 0
+
+
+def test_moments_about_any_point(tmp_path):
+    case = Body(shape="naca0012", angle_of_attack=10.0)
+    run = write_body(tmp_path / "run", case, lambda surface: surface.side, torque=0.25)
+    drag, lift = run.coefficient("x"), run.coefficient("y")
+    assert run.moment_coefficient(about=(4.0, 0.0)) == pytest.approx(-0.5)  # counterclockwise is nose down
+    # A lift that acts a distance a before the point lifts the nose; so does a drag that acts above it.
+    ahead = run.moment_coefficient(about=(4.5, 0.0)) - run.moment_coefficient(about=(4.0, 0.0))
+    assert ahead == pytest.approx(0.5 * lift)
+    above = run.moment_coefficient(about=(4.0, -0.5)) - run.moment_coefficient(about=(4.0, 0.0))
+    assert above == pytest.approx(0.5 * drag)
+    viscous = run.moment_coefficient("viscous", about=(4.5, 0.0))
+    assert viscous == pytest.approx(0.5 * run.coefficient("y", "viscous"))
+    quarter = run.moment()
+    assert quarter.mean == pytest.approx(run.moment(about=case.moment_point).mean)
+    assert run.summary()["mean pitching moment coefficient about c/4"] == quarter.mean
+    assert quarter.pressure + quarter.viscous == pytest.approx(quarter.mean)
+    assert np.isnan(run.moment(body="other").mean)
+
+
+def test_the_chord_of_a_file_is_its_extent_and_normalises_moments(tmp_path):
+    path = tmp_path / "plate.txt"
+    path.write_text("0 0\n2 0\n2 0.5\n0 0.5\n")
+    case = Body(shape=str(path), angle_of_attack=90.0)
+    assert case.chord == pytest.approx(2)
+    assert case.moment_point == pytest.approx([4.0, 0.5])  # the nose points up
+    run = write_body(tmp_path / "run", case, lambda surface: surface.side, torque=0.25)
+    assert run.moment_coefficient(about=(4.0, 0.0)) == pytest.approx(-0.5 / 4)
+    assert Cylinder().moment_point == pytest.approx([4, 0])
