@@ -53,7 +53,7 @@ pub fn find<const D: usize>(
             if beyond > radius {
                 return symptom("position", beyond);
             }
-            let under = depth(particles, frame, i);
+            let under = depth(settings, particles, frame, i);
             if under > DEEP * settings.particle_spacing {
                 return symptom("position", under);
             }
@@ -76,9 +76,9 @@ fn largest_volume(settings: &Settings) -> f64 {
 
 /// The least depth under the surface of a body that particle `i` can have, as the solid particles around it tell: a place
 /// at a distance from one is no less deep than it by more than that.
-fn depth<const D: usize>(particles: &Particles<D>, frame: &Frame<D>, i: usize) -> f64 {
+fn depth<const D: usize>(settings: &Settings, particles: &Particles<D>, frame: &Frame<D>, i: usize) -> f64 {
     let least = |j: usize| particles.depth[j] - (particles.position[j] - particles.position[i]).norm();
-    frame.stencil.neighbours.row(i).0.solid().iter().fold(0.0, |deepest: f64, entry| deepest.max(least(entry.j())))
+    frame.stencil.solids_near(settings, i).map(least).fold(0.0, f64::max)
 }
 
 /// How far `position` lies beyond the sides of the domain that particles cannot cross.

@@ -65,7 +65,7 @@ impl<const D: usize> Frame<D> {
         if travel.fraction > 0.0 {
             self.start.extend_from_slice(&particles.position[..particles.real]);
             let mut position = std::mem::take(&mut particles.position);
-            parallel::for_each(&mut position[..particles.real], |i, r| {
+            parallel::for_each(self.images.real(&mut position), |i, r| {
                 if !particles.is_fixed(i, &settings.bodies) {
                     *r += particles.velocity[i] * (travel.fraction * travel.time_step);
                 }
@@ -108,6 +108,7 @@ impl<const D: usize> Frame<D> {
 
     fn evaluate(&mut self, settings: &Settings, particles: &Particles<D>) {
         let images = &self.images;
+        images.blank(&mut self.stencil.volume, particles.len());
         self.stencil.evaluate(settings, particles, |volume| images.scalars(volume));
     }
 }
