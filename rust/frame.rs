@@ -68,7 +68,7 @@ impl<const D: usize> Frame<D> {
         if travel.fraction > 0.0 {
             self.start.extend_from_slice(&particles.position[..particles.real]);
             let mut position = std::mem::take(&mut particles.position);
-            parallel::for_each(&mut position[..particles.real], |i, r| {
+            parallel::for_each(self.images.real(&mut position), |i, r| {
                 if !particles.is_fixed(i, &settings.bodies) {
                     *r += particles.velocity[i] * (travel.fraction * travel.time_step);
                 }
@@ -115,6 +115,7 @@ impl<const D: usize> Frame<D> {
         self.stencil.neighbours.share_out(faces.is_empty(), |cluster, entries, out| {
             faces.share_out(particles, cluster, entries, out);
         });
+        images.blank(&mut self.stencil.volume, particles.len());
         self.stencil.evaluate(settings, particles, |volume| images.scalars(volume));
     }
 }

@@ -1,6 +1,6 @@
 //! Artificial particle displacement. (18) (19)
 
-use crate::boundary::Walls;
+use crate::boundary::{Poison, Walls};
 use crate::frame::Frame;
 use crate::kernel::{Kernel, Smoothing};
 use crate::lanes::{Lanes, add_product, from, matrices, norm_squared, vectors};
@@ -28,22 +28,29 @@ pub fn shift<const D: usize>(
     if settings.shifting == Shifting::None {
         return;
     }
-    let none = (Vector::zeros(), Vector::zeros(), 0.0);
-    change.resize(particles.real, none);
+    frame.images.blank(change, particles.real);
     with_kernel!(settings.kernel, K => {
         let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
         let stencil = &frame.stencil;
         let displacement = Displacement { settings, kernel, particles, stencil, walls, time_step, velocity_max };
         stencil.neighbours.for_each(change, &mut vec![(); particles.real], displacement);
     });
-    let Particles { real, position, velocity, pressure, .. } = particles;
-    parallel::for_each(&mut position[..*real], |i, r| *r += change[i].0);
-    parallel::for_each(&mut velocity[..*real], |i, u| *u += change[i].1);
-    parallel::for_each(&mut pressure[..*real], |i, p| *p += change[i].2);
+    let images = &frame.images;
+    parallel::for_each(images.real(&mut particles.position), |i, r| *r += change[i].0);
+    parallel::for_each(images.real(&mut particles.velocity), |i, u| *u += change[i].1);
+    parallel::for_each(images.real(&mut particles.pressure), |i, p| *p += change[i].2);
 }
 
 /// δr, δr·∇u and δr·∇p.
 pub type Change<const D: usize> = (Vector<D>, Vector<D>, f64);
+
+impl<const D: usize> Poison for Change<D> {
+    const POISON: Self = (Poison::POISON, Poison::POISON, Poison::POISON);
+
+    fn is_poison(&self) -> bool {
+        self.0.is_poison() || self.1.is_poison() || self.2.is_poison()
+    }
+}
 
 /// Displacement of every particle if it were fluid.
 struct Displacement<'a, K, const D: usize> {

@@ -93,6 +93,12 @@ impl<const D: usize> Simulation<D> {
         self.clock
     }
 
+    /// Whether copies of particles, and what is kept from step to step to save its memory, are made NaN when they go stale, so that
+    /// what reads them shows. It changes no result else. On from the start where debug assertions are.
+    pub fn poison(&mut self, on: bool) {
+        self.frame.images.poisons = on;
+    }
+
     pub fn threads(&self) -> usize {
         self.pool.current_num_threads()
     }

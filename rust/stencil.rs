@@ -68,6 +68,14 @@ impl<const D: usize> Stencil<D> {
         self.corrected = false;
     }
 
+    /// Solid particles in the support of particle `i`. Its row holds others too, neighbours of its cluster's, which must not count where
+    /// a zero slope does not see to it.
+    pub fn solids_near(&self, settings: &Settings, i: usize) -> impl Iterator<Item = usize> {
+        let limit = settings.neighbour_distance().powi(2);
+        let near = move |&j: &usize| (self.position[j] - self.position[i]).norm_squared() < limit;
+        self.neighbours.row(i).0.solid().iter().map(|entry| entry.j()).filter(near)
+    }
+
     /// Bring the corrections up to date, if no pass has done so on its way.
     pub fn correct(&mut self) {
         let real = self.correction.len();

@@ -2,16 +2,29 @@
 //!
 //! An image has position `sign * x + offset` and velocity `sign * u` of its source, and its scalars. Corners are images of
 //! images, so one direction after the other is enough.
+//!
+//! An image is a copy, stale once a field of the real particles is written and until it is renewed. So stages write through
+//! [`Images::real`], and begin what they form anew with [`Images::blank`]: with [`Images::poisons`] what is stale is NaN, which shows
+//! whatever reads it.
 
+use crate::boundary::poison::Poison;
 use crate::parallel;
 use crate::particles::{Particles, Vector};
 use crate::settings::{Boundary, Domain};
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Images<const D: usize> {
     source: Vec<u32>,
     sign: Vec<Vector<D>>,
     offset: Vec<Vector<D>>,
+    /// Whether what is stale is made NaN.
+    pub poisons: bool,
+}
+
+impl<const D: usize> Default for Images<D> {
+    fn default() -> Self {
+        Self { source: Vec::new(), sign: Vec::new(), offset: Vec::new(), poisons: cfg!(debug_assertions) }
+    }
 }
 
 impl<const D: usize> Images<D> {
@@ -64,6 +77,38 @@ impl<const D: usize> Images<D> {
         self.offset.push(offset);
     }
 
+    /// The entries of the real particles of `field`, to be written: those of the images are stale from here on.
+    pub fn real<'a, T: Poison>(&self, field: &'a mut [T]) -> &'a mut [T] {
+        let (real, images) = field.split_at_mut(field.len() - self.source.len());
+        if self.poisons {
+            images.fill(T::POISON);
+        }
+        real
+    }
+
+    /// Give `field`, whose memory is used again, `count` entries to be written; all are stale.
+    pub fn blank<T: Poison>(&self, field: &mut Vec<T>, count: usize) {
+        if self.poisons {
+            field.clear();
+        }
+        field.resize(count, T::POISON);
+    }
+
+    /// Panic if an image of `field`, empty where it is not used, is stale and not poisoned: then a stage has written past
+    /// [`Images::real`]. Nothing unless poison is on.
+    pub fn check<T: Poison + PartialEq>(&self, field: &[T], image: impl Fn(usize, T) -> T) {
+        if self.poisons && !field.is_empty() {
+            let (real, images) = field.split_at(field.len() - self.source.len());
+            for (k, value) in images.iter().enumerate() {
+                let renewed = image(k, real[self.source[k] as usize]);
+                assert!(
+                    value.is_poison() || renewed.is_poison() || *value == renewed,
+                    "image {k} is stale, and looks fresh"
+                );
+            }
+        }
+    }
+
     /// Renew the entries of the images from those of the real particles in front of them.
     fn renew<T: Copy + Send + Sync>(&self, field: &mut [T], image: impl Fn(usize, T) -> T + Sync + Send) {
         let (real, images) = field.split_at_mut(field.len() - self.source.len());
@@ -71,15 +116,23 @@ impl<const D: usize> Images<D> {
     }
 
     pub fn positions(&self, field: &mut [Vector<D>]) {
-        self.renew(field, |k, x| self.sign[k].component_mul(&x) + self.offset[k]);
+        self.renew(field, |k, x| self.position(k, x));
     }
 
     pub fn vectors(&self, field: &mut [Vector<D>]) {
-        self.renew(field, |k, u| self.sign[k].component_mul(&u));
+        self.renew(field, |k, u| self.vector(k, u));
     }
 
     /// Any field that an image shares with its source.
     pub fn scalars<T: Copy + Send + Sync>(&self, field: &mut [T]) {
         self.renew(field, |_, value| value);
+    }
+
+    pub fn position(&self, k: usize, x: Vector<D>) -> Vector<D> {
+        self.sign[k].component_mul(&x) + self.offset[k]
+    }
+
+    pub fn vector(&self, k: usize, u: Vector<D>) -> Vector<D> {
+        self.sign[k].component_mul(&u)
     }
 }

@@ -29,6 +29,10 @@ const SAME_WALL: f64 = 0.7;
 /// curvature next to a wall a fifth too small.
 const RIDGE: f64 = 1e-5;
 
+/// How far on its way to a surface particle, of all, fluid is moved before the nearest one is sought: of two just as near, as on a
+/// lattice, neither rounding nor their order decides.
+const TIE: f64 = 1e-9;
+
 /// exp(−x) beyond this is neglected.
 const NEGLIGIBLE: f64 = 10.0;
 
@@ -60,8 +64,7 @@ pub fn surface_area<const D: usize>(settings: &Settings, particles: &Particles<D
     }
     let above = |a: usize| stencil.position[a] + normal[a] * depth[a];
     // The other side of a plate may be as near as the next particle.
-    let near = stencil.neighbours.row(s).0.solid().iter().map(|entry| entry.j());
-    let near = near.filter(|&a| normal[a].dot(&normal[s]) > -SAME_WALL);
+    let near = stencil.solids_near(settings, s).filter(|&a| normal[a].dot(&normal[s]) > -SAME_WALL);
     with_kernel!(settings.kernel, K => {
         let kernel = Smoothing::<K>::new(settings.smoothing_length(), D - 1);
         weight(s) / near.map(|a| weight(a) * kernel.value((above(s) - above(a)).norm())).sum::<f64>()
@@ -106,9 +109,10 @@ impl<const D: usize> Wall<'_, D> {
             if away > NEGLIGIBLE {
                 return;
             }
-            let nearest = self.foot(j, &all_feet);
+            let place = stencil.position[j] + r_sj * TIE;
+            let nearest = self.foot(&place, &all_feet);
             is_above |= nearest == Some(s);
-            let foot = nearest.filter(|&a| self.same_wall(a, s)).or_else(|| self.foot(j, &feet));
+            let foot = nearest.filter(|&a| self.same_wall(a, s)).or_else(|| self.foot(&place, &feet));
             let height = foot.map_or(0.0, |a| self.height(j, a, &feet)) / spacing;
             if height > 0.0 {
                 let weight = weight * (-away).exp();
@@ -128,7 +132,7 @@ impl<const D: usize> Wall<'_, D> {
 
     /// Surface particles around solid particle `s`, itself among them if it is one.
     fn surface_near(&self, s: usize) -> impl Iterator<Item = usize> {
-        self.stencil.neighbours.row(s).0.solid().iter().map(|entry| entry.j()).filter(|&a| self.is_surface(a))
+        self.stencil.solids_near(self.settings, s).filter(|&a| self.is_surface(a))
     }
 
     /// Those of the same piece of wall.
@@ -136,9 +140,9 @@ impl<const D: usize> Wall<'_, D> {
         self.surface_near(s).filter(|&a| self.same_wall(a, s)).collect()
     }
 
-    /// The one of `feet` nearest to particle `j`.
-    fn foot(&self, j: usize, feet: &[usize]) -> Option<usize> {
-        let distance = |a: usize| (self.stencil.position[j] - self.stencil.position[a]).norm_squared();
+    /// The one of `feet` nearest to `place`.
+    fn foot(&self, place: &Vector<D>, feet: &[usize]) -> Option<usize> {
+        let distance = |a: usize| (place - self.stencil.position[a]).norm_squared();
         feet.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
     }
 

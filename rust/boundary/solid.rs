@@ -41,7 +41,7 @@ impl<const D: usize> Walls<D> {
                 let (velocity, spacing) = (&particles.velocity, settings.particle_spacing);
                 let basis = |n: f64| [n, n * n / 2.0, n * n * n / 6.0];
                 let found = profiles(settings, particles, &frame.stencil, velocity, |s| velocity[s], basis);
-                self.slope.resize(particles.real, None);
+                frame.images.blank(&mut self.slope, particles.real);
                 let seen = found.into_iter().map(|(s, profile)| {
                     self.slope[s] = profile.map(|profile| profile[0] / spacing);
                     (s, velocity[s] + value_at(profile, basis(-particles.depth[s] / spacing)))
@@ -70,7 +70,7 @@ impl<const D: usize> Walls<D> {
     }
 
     fn show(&mut self, particles: &Particles<D>, frame: &Frame<D>, seen: Vec<(usize, Vector<D>)>) {
-        self.viscous_velocity.resize(particles.len(), Vector::zeros());
+        frame.images.blank(&mut self.viscous_velocity, particles.len());
         seen.into_iter().for_each(|(s, seen)| self.viscous_velocity[s] = seen);
         frame.images.vectors(&mut self.viscous_velocity);
     }
@@ -87,14 +87,16 @@ impl<const D: usize> Walls<D> {
     ) {
         let Particles { real, kind, .. } = particles;
         let dispersion = &mut self.dispersion;
-        dispersion.resize(particles.len(), Vector::zeros());
+        frame.images.blank(dispersion, particles.len());
         parallel::for_each(&mut dispersion[..*real], |i, out| {
             *out = if kind[i] == ParticleKind::Fluid { laplacian(i) * factor } else { Vector::zeros() };
         });
+        frame.images.vectors(dispersion);
         let basis = |n: f64| [1.0, n];
         let solids = profiles(settings, particles, &frame.stencil, dispersion, |_| Vector::zeros(), basis);
+        let dispersion_of_real = frame.images.real(dispersion);
         for (s, profile) in solids {
-            dispersion[s] = value_at(profile, basis(-particles.depth[s] / settings.particle_spacing));
+            dispersion_of_real[s] = value_at(profile, basis(-particles.depth[s] / settings.particle_spacing));
         }
         frame.images.vectors(dispersion);
     }
@@ -145,23 +147,28 @@ fn shepard<const D: usize, const N: usize>(
 }
 
 /// Give each solid particle of `field` the Shepard average of what `at(field, j, r_ij)` says of the flowing neighbours; zero
-/// without neighbours. `kind` is that of the real particles.
+/// without neighbours. `kind` is that of the real particles. Images are renewed before and after.
 pub fn extrapolate<const D: usize>(
     settings: &Settings,
-    stencil: &Stencil<D>,
+    frame: &Frame<D>,
     kind: &[ParticleKind],
     field: &mut [f64],
     at: impl Fn(&[f64], usize, Vector<D>) -> f64 + Sync,
 ) {
+    frame.images.scalars(field);
     let values = &*field;
-    let average = |i| shepard(settings, stencil, i, |j, r_ij| [at(values, j, r_ij)]).map_or(0.0, |[average]| average);
+    let average = |i| shepard(settings, &frame.stencil, i, |j, r_ij| [at(values, j, r_ij)]).map_or(0.0, |[average]| average);
     let solids = (0..kind.len()).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
     let extrapolated: Vec<(usize, f64)> = solids.map(|i| (i, average(i))).collect();
-    extrapolated.into_iter().for_each(|(i, value)| field[i] = value);
+    if !extrapolated.is_empty() {
+        let real = frame.images.real(field);
+        extrapolated.into_iter().for_each(|(i, value)| real[i] = value);
+        frame.images.scalars(field);
+    }
 }
 
-/// `f(j, W_ij, r_ij)`, with what is seen of j as a factor of W, for those of the neighbours `near` of particle `i` that are in its support. Others of its cluster's may be
-/// there too, and what they carry may be stale.
+/// `f(j, W_ij, r_ij)` for those of the neighbours `near` of particle `i`, each with how much is seen of it, a factor of W, that are in its
+/// support. Others of its cluster's may be there too, and what they carry may be stale.
 pub fn for_each_weighted<const D: usize>(
     settings: &Settings,
     stencil: &Stencil<D>,

@@ -1,6 +1,6 @@
 //! The ALSPH step: equations (8) to (13) of the paper.
 
-use crate::boundary::{Walls, deep_in_inlet, extrapolate};
+use crate::boundary::{Poison, Walls, deep_in_inlet, extrapolate};
 use crate::frame::Frame;
 use crate::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, vector_laplacian};
 use crate::parallel;
@@ -41,13 +41,21 @@ pub struct Alsph<const D: usize> {
 }
 
 /// What the velocity of a real particle gives beside ∇·u^m.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Derived<const D: usize> {
     /// ∇²u^m.
     pub laplacian: Vector<D>,
     /// The ∇·u that a solenoidal u^{n+1} has in the frame of the derivatives: in the middle of the step, half a step before r^{n+1},
     /// it is ½Δt tr (∇u)². Zero in the paper's algorithms.
     pub solenoidal: f64,
+}
+
+impl<const D: usize> Poison for Derived<D> {
+    const POISON: Self = Self { laplacian: Poison::POISON, solenoidal: Poison::POISON };
+
+    fn is_poison(&self) -> bool {
+        self.laplacian.is_poison() || self.solenoidal.is_poison()
+    }
 }
 
 /// What stays the same during one step.
@@ -89,6 +97,7 @@ impl<const D: usize> Alsph<D> {
                 frame.update(step.settings, particles);
             }
             self.velocity_derivatives(step, particles, frame, walls);
+            self.check_images(particles, frame, walls);
             let (divergence_max, divergence_sum) = self.divergence_norms(particles); // (13)
             let converged = divergence_max <= step.settings.divergence_tolerance;
             if converged || iteration == step.settings.max_iterations || !divergence_max.is_finite() {
@@ -109,24 +118,23 @@ impl<const D: usize> Alsph<D> {
         copy(start, &mut self.position_initial);
         copy(&particles.velocity[..real], &mut self.velocity_initial);
         copy(&particles.pressure[..real], &mut self.pressure_initial);
-        self.divergence_pressure.resize(count, [0.0; 2]);
-        self.derived.resize(real, Derived { laplacian: Vector::zeros(), solenoidal: 0.0 });
-        self.velocity_star.resize(count, Vector::zeros());
-        self.pressure_laplacian.resize(real, 0.0);
-        self.pressure_gradient.resize(count, Vector::zeros());
+        let images = &frame.images;
+        images.blank(&mut self.divergence_pressure, count);
+        images.blank(&mut self.derived, real);
+        images.blank(&mut self.velocity_star, count);
+        images.blank(&mut self.pressure_laplacian, real);
     }
 
     /// ∇·u^m and ∇²u^m, and p^m beside ∇·u^m: the first pass over a frame, so it forms the corrections too.
     fn velocity_derivatives(&mut self, step: Step, particles: &Particles<D>, frame: &mut Frame<D>, walls: &mut Walls<D>) {
         walls.see(step.settings, particles, frame);
-        let real = particles.real;
         let (velocity, pressure) = (&particles.velocity, &particles.pressure);
         let walls = &*walls;
         let seen = |s, i| walls.seen_by(particles, s, i);
         let lead = step.settings.derivative_frame.fraction() * step.time_step;
         frame.stencil.correct_and_for_each(
             LaplacianAndGradient { velocity, seen },
-            &mut self.divergence_pressure[..real],
+            frame.images.real(&mut self.divergence_pressure),
             &mut self.derived,
             |i, (laplacian, gradient), out, derived| {
                 let solenoidal = if lead > 0.0 { lead * (gradient * gradient).trace() } else { 0.0 };
@@ -150,7 +158,7 @@ impl<const D: usize> Alsph<D> {
         walls.sharpen(step.settings, particles, frame, |i| self.derived[i].laplacian, step.dispersion);
         let dispersion = &walls.dispersion;
         let count = particles.real;
-        self.sharpening.resize(count, Vector::zeros());
+        frame.images.blank(&mut self.sharpening, count);
         frame.stencil.for_each_one(
             LaplacianAndGradient { velocity: dispersion, seen: |s: usize, _: usize| dispersion[s] },
             &mut self.sharpening,
@@ -160,7 +168,6 @@ impl<const D: usize> Alsph<D> {
 
     /// u* (8), and ∇²p^m for (10), which reads the same neighbours.
     fn predict_velocity(&mut self, step: Step, particles: &Particles<D>, frame: &Frame<D>) {
-        let real = particles.real;
         let gravity = Vector::<D>::from_column_slice(&step.settings.body_force);
         let (dt, viscosity) = (step.time_step, step.settings.kinematic_viscosity);
         let paper_walls = step.settings.wall_pressure == WallPressure::Paper;
@@ -168,7 +175,7 @@ impl<const D: usize> Alsph<D> {
         let sharpening = |i: usize| self.sharpening.get(i).copied().unwrap_or_else(Vector::zeros);
         frame.stencil.for_each(
             GradientAndLaplacian(&self.divergence_pressure),
-            &mut self.velocity_star[..real],
+            frame.images.real(&mut self.velocity_star),
             &mut self.pressure_laplacian,
             |i, (penalty, p), star, pressure_laplacian| {
                 let still = match particles.kind[i] {
@@ -191,17 +198,18 @@ impl<const D: usize> Alsph<D> {
     fn update_pressure(&mut self, step: Step, particles: &mut Particles<D>, frame: &Frame<D>) {
         if step.settings.wall_pressure == WallPressure::Linear {
             let gradient = &mut self.pressure_gradient;
-            frame.stencil.evaluate_near_solids(Gradient(&particles.pressure), &mut gradient[..particles.real]);
+            frame.images.blank(gradient, particles.len());
+            frame.stencil.evaluate_near_solids(Gradient(&particles.pressure), frame.images.real(gradient));
             frame.images.vectors(gradient);
         }
-        let Particles { real, kind, normal, position, pressure, .. } = particles;
+        let Particles { kind, normal, position, pressure, .. } = particles;
         let (kind, normal) = (&*kind, &*normal);
         let Step { settings, time_step: dt, penalty, .. } = step;
         let paper_walls = settings.wall_pressure == WallPressure::Paper;
         let (star, initial, laplacian) = (&self.velocity_star, &self.velocity_initial, &self.pressure_laplacian);
         let derived = &self.derived;
         let (position, deep_in_inlet) = (&*position, deep_in_inlet(settings));
-        frame.stencil.for_each_one(Divergence(star), &mut pressure[..*real], |i, divergence, p| {
+        frame.stencil.for_each_one(Divergence(star), frame.images.real(pressure), |i, divergence, p| {
             let solid = kind[i] == ParticleKind::Solid;
             let divergence = if deep_in_inlet(kind[i], &position[i]) { 0.0 } else { divergence - derived[i].solenoidal };
             if kind[i] == ParticleKind::Outlet {
@@ -214,10 +222,10 @@ impl<const D: usize> Alsph<D> {
                 *p += 0.5 * settings.density * (star[i] - initial[i]).dot(&normal[i]).powi(2);
             }
         });
-        frame.images.scalars(&mut particles.pressure);
-        if !paper_walls {
+        if paper_walls {
+            frame.images.scalars(pressure);
+        } else {
             self.extrapolate_wall_pressure(settings, particles, frame);
-            frame.images.scalars(&mut particles.pressure);
         }
     }
 
@@ -231,15 +239,15 @@ impl<const D: usize> Alsph<D> {
             _ => gravity * settings.density,
         };
         let continued = |pressure: &[f64], j: usize, r_ij: Vector<D>| pressure[j] + gradient(j).dot(&r_ij);
-        extrapolate(settings, &frame.stencil, &kind[..*real], pressure, continued);
+        extrapolate(settings, frame, &kind[..*real], pressure, continued);
     }
 
     /// u^{m+1} (11). Buffers and solids keep their velocities.
     fn correct_velocity(&mut self, step: Step, particles: &mut Particles<D>, frame: &Frame<D>) {
-        let Particles { real, kind, pressure, velocity, .. } = particles;
+        let Particles { kind, pressure, velocity, .. } = particles;
         let (kind, pressure, star) = (&*kind, &*pressure, &self.velocity_star);
         let factor = step.time_step / step.settings.density;
-        frame.stencil.for_each_one(Gradient(pressure), &mut velocity[..*real], |i, gradient, u| {
+        frame.stencil.for_each_one(Gradient(pressure), frame.images.real(velocity), |i, gradient, u| {
             if kind[i] == ParticleKind::Fluid {
                 *u = star[i] - gradient * factor;
             }
@@ -250,7 +258,7 @@ impl<const D: usize> Alsph<D> {
     /// r^{n+1} (12), for everything that moves with its velocity.
     pub fn advance_positions(&self, step: Step, particles: &mut Particles<D>, frame: &Frame<D>) {
         let mut position = std::mem::take(&mut particles.position);
-        parallel::for_each(&mut position[..particles.real], |i, r| {
+        parallel::for_each(frame.images.real(&mut position), |i, r| {
             if !particles.is_fixed(i, &step.settings.bodies) {
                 let velocity = self.velocity_initial[i] + particles.velocity[i];
                 *r = self.position_initial[i] + velocity * (0.5 * step.time_step);
@@ -258,6 +266,21 @@ impl<const D: usize> Alsph<D> {
         });
         frame.images.positions(&mut position);
         particles.position = position;
+    }
+
+    /// Panic if a stage has left stale images that look fresh. Nothing unless poison is on.
+    fn check_images(&self, particles: &Particles<D>, frame: &Frame<D>, walls: &Walls<D>) {
+        let images = &frame.images;
+        images.check(&particles.position, |k, x| images.position(k, x));
+        for field in
+            [&particles.velocity, &self.velocity_star, &self.pressure_gradient, &walls.viscous_velocity, &walls.dispersion]
+        {
+            images.check(field, |k, u| images.vector(k, u));
+        }
+        for field in [&particles.pressure, &frame.stencil.volume] {
+            images.check(field, |_, value| value);
+        }
+        images.check(&self.divergence_pressure, |_, value| value);
     }
 
     /// max and Σ of |∇·u| over the fluid.

@@ -50,16 +50,15 @@ impl Projection {
         let (kind, position) = (&kind[..*real], &*position);
         let deep_in_inlet = deep_in_inlet(settings);
         let divergence = &mut self.divergence;
-        divergence.resize(velocity.len(), 0.0);
+        frame.images.blank(divergence, velocity.len());
         let factor = PRESSURE_SHARE * settings.density * relaxation / time_step;
         for _ in 0..settings.projection_sweeps {
-            frame.stencil.for_each_one(Divergence(velocity), &mut divergence[..*real], |i, value, out| {
+            frame.stencil.for_each_one(Divergence(velocity), frame.images.real(divergence), |i, value, out| {
                 let none = kind[i] == ParticleKind::Outlet || deep_in_inlet(kind[i], &position[i]);
                 *out = if none { 0.0 } else { value - derived[i].solenoidal };
             });
-            extrapolate(settings, &frame.stencil, kind, divergence, |divergence, j, _| divergence[j]);
-            frame.images.scalars(divergence);
-            let (corrected, pressure) = (&mut velocity[..*real], &mut pressure[..*real]);
+            extrapolate(settings, frame, kind, divergence, |divergence, j, _| divergence[j]);
+            let (corrected, pressure) = (frame.images.real(velocity), frame.images.real(pressure));
             frame.stencil.for_each(Gradient(divergence), corrected, pressure, |i, gradient, u, p| {
                 *p -= factor * divergence[i];
                 if kind[i] == ParticleKind::Fluid {
@@ -67,6 +66,7 @@ impl Projection {
                 }
             });
             frame.images.vectors(velocity);
+            frame.images.check(divergence, |_, value| value);
         }
         frame.images.scalars(pressure);
     }
