@@ -260,8 +260,11 @@ fn couette_flow_between_cylinders_turns_the_inner_one() {
                 bodies.push(json!({"name": format!("outer {}", bodies.len()), "velocity": (turning * speed).as_slice(), "moves": false, "center": [0.5, 0.5]}));
             }
             particles.position.push((arm * radius).add_scalar(0.5));
-            (particles.velocity.push(turning * speed), particles.pressure.push(0.0));
-            (particles.kind.push(kind), particles.depth.push(depth), particles.normal.push(normal));
+            particles.velocity.push(turning * speed);
+            particles.pressure.push(0.0);
+            particles.kind.push(kind);
+            particles.depth.push(depth);
+            particles.normal.push(normal);
         }
     }
     particles.real = particles.position.len();

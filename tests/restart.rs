@@ -183,7 +183,9 @@ fn add<const D: usize>(
     particles.velocity.push(velocity);
     particles.pressure.push(0.05 * (x.cos() + y.cos()));
     particles.body.push(if into_wall.norm() == 0.0 { 2 } else { u16::from(into_wall[1] > 0.0) } * u16::from(depth > 0.0));
-    (particles.kind.push(kind), particles.depth.push(depth), particles.normal.push(outward));
+    particles.kind.push(kind);
+    particles.depth.push(depth);
+    particles.normal.push(outward);
     particles.position.push(position);
 }
 
