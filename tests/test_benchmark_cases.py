@@ -246,7 +246,7 @@ def test_fluid_flows_around_the_body(shape, angle):
     assert angles.min() >= 0 and angles.max() < 360
     assert (np.diff(surface.chord[surface.side > 0]) > -1e-12).all()
     assert (np.diff(surface.chord[surface.side < 0]) < 1e-12).all()
-    assert shapely.distance(case.outline.exterior, shapely.points(points - [2, 0])).max() < 1e-9
+    assert shapely.distance(body.exterior, shapely.points(points - [2, 0])).max() < 1e-9
     directions = np.stack([-np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
     assert (points - [2, 0]) / np.hypot(*(points - [2, 0]).T)[:, None] == pytest.approx(directions, abs=1e-8)
 

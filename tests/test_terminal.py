@@ -44,7 +44,7 @@ def test_what_a_folder_says_reaches_no_terminal_raw(run, alsph):
     (run.path / "run.json").write_text(json.dumps(info))
     code, output, complaints = alsph("info", run.path)
     assert code == 0 and harmless(output + complaints)
-    assert output.count(ESCAPED) == 2 and r"run\x1b[31m" in output
+    assert output.count(ESCAPED) == 3 and r"run\x1b[31m" in output
     again = Run(run.path)
     assert ESCAPED in repr(again) and harmless(repr(again))
     assert ESCAPED in again._repr_html_() and harmless(again._repr_html_())

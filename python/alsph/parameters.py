@@ -12,6 +12,8 @@ from alsph.errors import ConfigError
 from alsph.text import shown
 
 WHOLE, NUMBER = "must be a whole number", "must be a number"
+LONGEST_PATH = 300
+
 WORDS = {
     "int_type": WHOLE,
     "int_from_float": WHOLE,
@@ -144,4 +146,5 @@ def _mistake(model: type[Parameters], mistake: Any) -> str:
         words = WORDS["int_parsing_size"]
     if words == WHOLE and isinstance(value, float) and value.is_integer():
         words += f", as {value:.0f}"
-    return f"{name} = {shown(value)}: {words} ({model.describe(str(mistake['loc'][0]))})"
+    typed = shown(value, LONGEST_PATH) if isinstance(value, str) else shown(value)
+    return f"{name} = {typed}: {words} ({model.describe(str(mistake['loc'][0]))})"

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import shapely
 from shapely import MultiPolygon, Polygon
 
+from alsph.thin import THINNEST, thickness
+
 if TYPE_CHECKING:
     from alsph.results import Run
 
@@ -41,6 +43,9 @@ DIVERGENCE = 0.02
 
 FEW_PERIODS = 5
 
+
+TOO_THIN = "too thin"
+"""What is remarked on a body that the resolution does not carry, and refused."""
 
 THICK = 8.0
 """Thickness of a body [Δx] from which its recorded loads have met the momentum balance within 3 % (docs/results.md)."""
@@ -166,16 +171,22 @@ def thinnest(shape: Polygon | MultiPolygon) -> float:
     return thin
 
 
-def thin(shape: Polygon | MultiPolygon, carried: Polygon | MultiPolygon, thickness: float, spacing: float) -> list[str]:
+def thin(name: str, shape: Polygon, carried: Polygon | MultiPolygon, spacing: float) -> list[str]:
     """Remark on what the resolution cuts off a body, and on loads that two near faces make uncertain (lengths in D).
 
     Parameters
     ----------
+    name
+        Name of the body.
     shape, carried
         The body, and what is carried of it.
-    thickness, spacing : float
-        Of its thickest part, and Δx.
+    spacing : float
+        Particle spacing Δx.
     """
+    thick = thickness(shape)
+    if carried.is_empty:
+        text = f"the {name} is at most {thick:.3g} D or {thick / spacing:.3g} Δx thick, the flow would go through it"
+        return [f"{TOO_THIN}: {text}; it takes {THINNEST:g} Δx, resolution = {math.ceil(THINNEST / thick)} or more"]
     found = []
     tips = [shapely.hausdorff_distance(shape, carried), 1 - carried.area / shape.area]
     if tips[0] > spacing:
@@ -183,8 +194,8 @@ def thin(shape: Polygon | MultiPolygon, carried: Polygon | MultiPolygon, thickne
             f"cut off, for they are thinner than 2 Δx: up to {tips[0]:.2g} D of tips, {100 * tips[1]:.2g} % of the area"
         )
         found.append(f"thin parts: {text}; they come back with resolution")
-    if thickness < THICK * spacing:
-        text = f"{thickness / spacing:.2g} Δx at its thickest; recorded lift and drag may be 10 to 20 % too small"
+    if thick < 0.99 * THICK * spacing:
+        text = f"{thick / spacing:.2g} Δx at its thickest; recorded lift and drag may be 10 to 20 % too small"
         found.append(f"thin body: {text}, as beside the momentum balance of a box; use a finer resolution")
     return found
 

@@ -53,10 +53,10 @@ def in_figure(text: str) -> str:
     return printable(text).replace("$", r"\$")
 
 
-def shown(value: Any) -> str:
+def shown(value: Any, longest: int = LONGEST_VALUE) -> str:
     """Return a value as it would be typed, for messages: printable, and cut where it is very long."""
     try:
         text = printable(repr(value))
     except (ValueError, RecursionError):  # numbers of thousands of digits, tables nested without end
         return f"a {type(value).__name__} too long to be shown"
-    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 4]} ..."
+    return text if len(text) <= longest else f"{text[: longest - 4]} ..."

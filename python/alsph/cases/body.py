@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable
 from functools import cached_property
@@ -15,12 +14,14 @@ from shapely import affinity
 
 from alsph import remarks
 from alsph.cases.channel import Channel
+from alsph.errors import ConfigError
 from alsph.geometry import FloatArray, Solid
 from alsph.measures import Measure
 from alsph.outline import Outline
 from alsph.packing import pack
+from alsph.remarks import TOO_THIN
 from alsph.surface import Surface, along, edges
-from alsph.thin import THINNEST, carried, solid, thickness
+from alsph.thin import carried, solid
 
 if TYPE_CHECKING:
     from alsph.results import Run
@@ -75,18 +76,6 @@ class Body(Channel):
             )
         return self
 
-    @model_validator(mode="after")
-    def _is_carried(self) -> Self:
-        for name, outline, left in zip(self.coefficient_bodies, self.outlines, self.carried, strict=True):
-            if left.is_empty:
-                thickest = thickness(outline)
-                raise ValueError(
-                    f"resolution = {self.resolution}: the {name} is at most {thickest:.3g} D, or "
-                    f"{thickest * self.resolution:.3g} Δx, thick and would not keep the flow apart; it takes "
-                    f"{THINNEST:g} Δx, a resolution of {math.ceil(THINNEST / thickest)} or more"
-                )
-        return self
-
     @cached_property
     def outline(self) -> shapely.Polygon | shapely.MultiPolygon:
         """The body, or all bodies together, their centroid at the origin, turned by the angle of attack."""
@@ -119,10 +108,18 @@ class Body(Channel):
 
     @cached_property
     def _solids(self) -> list[Solid]:
+        if too_thin := [remark for remark in self.remarks() if remark.startswith(TOO_THIN)]:
+            raise ConfigError(too_thin[0])
         return [solid(outline, self.particle_spacing, self.support_layers) for outline in self.carried]
 
     def solids(self) -> list[Solid]:
-        """Return layers along the surface of each body, with two faces where it is thin."""
+        """Return layers along the surface of each body, with two faces where it is thin.
+
+        Raises
+        ------
+        ConfigError
+            If a body is too thin for the resolution.
+        """
         return self._solids
 
     def fluid(self, cells: FloatArray) -> FloatArray:
@@ -153,8 +150,8 @@ class Body(Channel):
         unknown = "not validated: flow past this body; it has not been compared with the results of others"
         thin = [
             remark
-            for outline, left in zip(self.outlines, self.carried, strict=True)
-            for remark in remarks.thin(outline, left, thickness(left), self.particle_spacing)
+            for name, outline, left in zip(self.coefficient_bodies, self.outlines, self.carried, strict=True)
+            for remark in remarks.thin(name, outline, left, self.particle_spacing)
         ]
         return [*super().remarks(), *thin, unknown]
 
@@ -186,7 +183,8 @@ class Body(Channel):
     def surface_points(self) -> Surface:
         """Return the pieces of the bodies as carried, from the leading edge over the upper side and back below."""
         left, _, right, _ = self._upright.bounds
-        parts = shapely.MultiPolygon([part for body in self.carried for part in shapely.get_parts(body)])
+        bodies = [outline if left.is_empty else left for outline, left in zip(self.outlines, self.carried, strict=True)]
+        parts = shapely.MultiPolygon([part for body in bodies for part in shapely.get_parts(body)])
         return along(parts, self.angle_of_attack, (left, right)).moved(self.centre)
 
 
