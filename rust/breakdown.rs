@@ -53,7 +53,7 @@ pub fn find<const D: usize>(
             if beyond > radius {
                 return symptom("position", beyond);
             }
-            let under = depth(particles, frame, i);
+            let under = depth(settings, particles, frame, i);
             if under > DEEP * settings.particle_spacing {
                 return symptom("position", under);
             }
@@ -76,12 +76,12 @@ fn largest_volume(settings: &Settings) -> f64 {
 
 /// The least depth under the surface of a body that particle `i` can have, as the solid particles around it tell: a place
 /// at a distance from one is no less deep than it by more than that.
-fn depth<const D: usize>(particles: &Particles<D>, frame: &Frame<D>, i: usize) -> f64 {
+fn depth<const D: usize>(settings: &Settings, particles: &Particles<D>, frame: &Frame<D>, i: usize) -> f64 {
     let least = |j: usize| particles.depth[j] - (particles.position[j] - particles.position[i]).norm();
     let (row, lane) = frame.stencil.neighbours.row(i);
     // Of two at one place, the one whose face it is not on is deeper.
-    let facing = row.solid_seen(lane).filter(|(_, share)| *share > 0.5);
-    facing.fold(0.0, |deepest: f64, (entry, _)| deepest.max(least(entry.j())))
+    let facing = row.solid_seen(lane).filter(|(_, share)| *share > 0.5).map(|(entry, _)| entry.j());
+    facing.filter(|&j| frame.stencil.is_near(settings, i, j)).map(least).fold(0.0, f64::max)
 }
 
 /// How far `position` lies beyond the sides of the domain that particles cannot cross.

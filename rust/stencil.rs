@@ -68,12 +68,15 @@ impl<const D: usize> Stencil<D> {
         self.corrected = false;
     }
 
-    /// Solid particles in the support of particle `i`. Its row holds others too, neighbours of its cluster's, which must not count where
-    /// a zero slope does not see to it.
+    /// Whether particle `j` is in the support of particle `i`. The row of `i` holds others too, neighbours of its cluster's, which must not
+    /// count where no zero slope sees to it.
+    pub fn is_near(&self, settings: &Settings, i: usize, j: usize) -> bool {
+        (self.position[j] - self.position[i]).norm_squared() < settings.neighbour_distance().powi(2)
+    }
+
+    /// Solid particles in the support of particle `i`.
     pub fn solids_near(&self, settings: &Settings, i: usize) -> impl Iterator<Item = usize> {
-        let limit = settings.neighbour_distance().powi(2);
-        let near = move |&j: &usize| (self.position[j] - self.position[i]).norm_squared() < limit;
-        self.neighbours.row(i).0.solid().iter().map(|entry| entry.j()).filter(near)
+        self.neighbours.row(i).0.solid().iter().map(|entry| entry.j()).filter(move |&j| self.is_near(settings, i, j))
     }
 
     /// Bring the corrections up to date, if no pass has done so on its way.
