@@ -118,7 +118,9 @@ fn numbers<const D: usize>(load: &Load<D>) -> Vec<f64> {
 /// What walls show and the loads on them are the same, but for rounding, in another order of storage, and so with other clusters.
 fn check_order<const D: usize>(side: usize, particles: Particles<D>) {
     let count = particles.real;
-    let step = (count / 2 + 1..).find(|step| (2..=*step).all(|d| count % d > 0 || step % d > 0)).expect("coprime");
+    let step = (count / 2 + 1..)
+        .find(|step| (2..=*step).all(|d| !count.is_multiple_of(d) || !step.is_multiple_of(d)))
+        .expect("coprime");
     let order: Vec<u32> = (0..count).map(|i| (i * step % count) as u32).collect();
     for rule in RULES {
         let settings = common::parse(&settings::<D>(side, rule, "periodic"));
