@@ -66,7 +66,11 @@ struct Displacement<'a, K, const D: usize> {
 impl<K: Kernel, const D: usize> Visit<Change<D>, ()> for Displacement<'_, K, D> {
     #[inline(always)]
     fn visit<V: Lanes>(&self, cluster: Cluster, row: Row<'_>, out: &mut [Change<D>], _: &mut [()]) {
-        let Surroundings { asymmetry, relative, total, distances, count } = self.surroundings::<V>(cluster, row);
+        let Surroundings { asymmetry, relative, total, distances, count } = if row.shares().is_empty() {
+            self.surroundings::<V, false>(cluster, row)
+        } else {
+            self.surroundings::<V, true>(cluster, row)
+        };
         let (asymmetry, relative) = (vectors(asymmetry), vectors(relative));
         let (total, distances, count) = (total.store(), distances.store(), count.store());
         let Particles { velocity, pressure, kind, .. } = self.particles;
@@ -124,10 +128,10 @@ struct Surroundings<V, const D: usize> {
 }
 
 impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
-    /// At r^{n+1}, over the neighbours in the frame of the last derivatives. The distances in double precision: the rounding of
+    /// At r^{n+1}, over the neighbours in the frame of the last derivatives, those that are seen in part by their shares (`SHARED`). The distances in double precision: the rounding of
     /// single would break the symmetry of a symmetric flow within a few steps.
     #[inline(always)]
-    fn surroundings<V: Lanes>(&self, cluster: Cluster, row: Row<'_>) -> Surroundings<V, D> {
+    fn surroundings<V: Lanes, const SHARED: bool>(&self, cluster: Cluster, row: Row<'_>) -> Surroundings<V, D> {
         let in_frame = &self.stencil.position;
         let Particles { position, velocity, .. } = self.particles;
         let here: [V; D] = cluster.vectors(position);
@@ -145,8 +149,8 @@ impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
                 let (j, r_ij, (q, inverse, value)) = (two_j[k], r[k], ratios[k]);
                 // The row also holds particles beyond the support of this lane, which must not count.
                 let mut inside = norm_squared(from(here_in_frame, &in_frame[j])).below(limit);
-                if let Some(shares) = row.shares.get(2 * pair + k) {
-                    inside = inside * V::load_single(shares);
+                if SHARED {
+                    inside = inside * V::load_single(&row.shares()[2 * pair + k]);
                 }
                 add_product(&mut asymmetry, inside * inverse * (inverse * inverse), r_ij);
                 distances = distances.plus_product(inside, q);

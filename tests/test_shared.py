@@ -97,7 +97,7 @@ def test_two_threads_that_step_at_once_get_steps_or_a_plain_error(small):
 
 def changed(problem, **changes):
     state = problem.state | changes
-    return type(problem)(problem.settings, state, problem.coefficient_body)
+    return type(problem)(problem.settings, state, problem.coefficient_bodies)
 
 
 def test_arrays_that_convert_exactly_are_taken(small):

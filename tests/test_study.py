@@ -195,8 +195,10 @@ def test_a_run_that_fails_is_reported_and_the_others_go_on(tmp_path):
 
 
 def test_a_run_that_failed_before_is_tried_again(tmp_path):
-    path = tmp_path / RUNS / declare().points()[0].name
+    point = declare().points()[0]
+    path = tmp_path / RUNS / point.name
     path.mkdir(parents=True)
+    point.config.save(path / "case.toml")
     (path / "run.json").write_text(json.dumps({"status": "failed"}))
     assert study.run(declare(), tmp_path, progress=False).complete
 

@@ -389,7 +389,8 @@ def _pressure_over_chord(
 
 
 def _samples(coefficient: PressureCoefficient) -> str:
-    return f"mean of {coefficient.samples} samples, band: ± 1 standard deviation"
+    still = f", {DEVELOPING}" if coefficient.developing else ""
+    return f"mean of {coefficient.samples} samples{still}, band: ± 1 standard deviation"
 
 
 def _finish_pressure(axes: Axes, coefficient: PressureCoefficient) -> None:

@@ -186,7 +186,9 @@ def thin(name: str, shape: Polygon, carried: Polygon | MultiPolygon, spacing: fl
     thick = thickness(shape)
     if carried.is_empty:
         text = f"the {name} is at most {thick:.3g} D or {thick / spacing:.3g} Δx thick, the flow would go through it"
-        return [f"{TOO_THIN}: {text}; it takes {THINNEST:g} Δx, resolution = {math.ceil(THINNEST / thick)} or more"]
+        return [
+            f"{TOO_THIN}: {text}; it takes {THINNEST:g} Δx, resolution = {math.ceil(THINNEST / thick - 0.05)} or more"
+        ]
     found = []
     tips = [shapely.hausdorff_distance(shape, carried), 1 - carried.area / shape.area]
     if tips[0] > spacing:

@@ -488,7 +488,7 @@ class Run:
     def _saved(self, figure: Figure, path: str | Path | None) -> Figure:
         plotting.remark(figure, remarks.brief(self.remarks))
         if path is not None:
-            figure.savefig(path)
+            plotting.save(figure, path)
         return figure
 
     def __repr__(self) -> str:

@@ -49,8 +49,9 @@ impl Entry {
 pub struct Row<'a> {
     entries: &'a [Entry],
     flowing: usize,
-    /// How much of each neighbour each particle of the cluster sees; empty if all of them see all.
-    pub shares: &'a [[f32; LANES]],
+    shares: &'a [[f32; LANES]],
+    shared: &'a [[u32; 2]],
+    number: usize,
 }
 
 impl<'a> Row<'a> {
@@ -70,6 +71,12 @@ impl<'a> Row<'a> {
         &self.entries[self.flowing..]
     }
 
+    /// How much of each neighbour each particle of the cluster sees; empty if all of them see all.
+    #[inline(always)]
+    pub fn shares(&self) -> &'a [[f32; LANES]] {
+        shares_of(self.shares, self.shared, self.number)
+    }
+
     /// The flowing neighbours that the particle of a lane sees any of, and how much.
     pub fn flowing_seen(&self, lane: usize) -> impl Iterator<Item = (Entry, f64)> + use<'a> {
         self.seen(0..self.flowing, lane)
@@ -81,7 +88,7 @@ impl<'a> Row<'a> {
     }
 
     fn seen(&self, range: Range<usize>, lane: usize) -> impl Iterator<Item = (Entry, f64)> + use<'a> {
-        let Self { entries, shares, .. } = *self;
+        let (entries, shares) = (self.entries, self.shares());
         let share = move |k| shares.get(k).map_or(1.0, |shares: &[f32; LANES]| f64::from(shares[lane]));
         range.map(move |k| (entries[k], share(k))).filter(|(_, share)| *share > 0.0)
     }
@@ -93,7 +100,7 @@ pub struct RowMut<'a> {
     pub entries: &'a mut [Entry],
     /// Number of flowing neighbours, which come first.
     pub flowing: usize,
-    /// As in [`Row`].
+    /// [`Row::shares`].
     pub shares: &'a [[f32; LANES]],
 }
 
@@ -162,8 +169,8 @@ impl Chunk {
     #[inline(always)]
     fn row(&self, row: usize) -> Row<'_> {
         let [start, solid] = self.starts[row];
-        let shares = shares_of(&self.shares, &self.shared, row);
-        Row { entries: &self.entries[self.range(row)], flowing: (solid - start) as usize, shares }
+        let (shares, shared) = (&self.shares[..], &self.shared[..]);
+        Row { entries: &self.entries[self.range(row)], flowing: (solid - start) as usize, shares, shared, number: row }
     }
 
     #[inline(always)]
