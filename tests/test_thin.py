@@ -82,3 +82,20 @@ def test_symmetric_flow_past_a_square_between_lattice_lines_has_no_lift(resoluti
     simulation = case.simulation(threads=1)
     simulation.advance(60)
     assert np.abs(simulation.history()["lift_coefficient"]).max() < 1e-6
+
+
+@pytest.mark.parametrize("length", [2.0, 4.0])
+def test_fluid_stays_within_a_channel_that_the_body_nearly_fills(length):
+    case = Body(resolution=8, length=length, height=2.0, upstream=1.0)
+    state = case.particles()
+    fluid = state["position"][state["kind"] == Kind.FLUID]
+    lower, upper = np.array(case.domain()["lower"]), np.array(case.domain()["upper"])
+    assert np.minimum(fluid - lower, upper - fluid).min() > 0.4 / case.resolution
+    assert KDTree(fluid).query(fluid, 2)[0][:, 1].min() > 0.75 / case.resolution
+
+
+def test_nothing_is_carried_apart_from_where_a_disc_fits_in():
+    """The wide corners of a short thin stub are near the body, and cut off from it."""
+    box = shapely.box(-0.5, -0.5, 0.5, 0.5)
+    carried = thin.carried(box.union(shapely.box(0.5, -0.03, 0.65, 0.03)), 0.1)
+    assert carried.geom_type == "Polygon" and carried.symmetric_difference(box).area < 0.002

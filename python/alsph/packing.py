@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from shapely import MultiPolygon, Polygon
 
-from alsph.geometry import FloatArray, inside
+from alsph.geometry import FloatArray, inside, lattice, symmetric_centres
 from alsph.thin import is_symmetric
 
 BAND = 4.0
@@ -24,7 +24,7 @@ EVEN = 1e-6
 """Displacement [Δx] below which particles count as evenly spaced: on a lattice that fits the body they stay."""
 
 
-def pack(lattice: FloatArray, body: Polygon | MultiPolygon, solid: FloatArray, spacing: float) -> FloatArray:
+def pack(cells: FloatArray, body: Polygon | MultiPolygon, solid: FloatArray, spacing: float) -> FloatArray:
     """Return fluid particles (m, 2) around a body, their number times Δx² being the area that it leaves.
 
     Those next to the body are taken from where they are most crowded until the number is right, and then repel each
@@ -33,8 +33,8 @@ def pack(lattice: FloatArray, body: Polygon | MultiPolygon, solid: FloatArray, s
 
     Parameters
     ----------
-    lattice
-        Cell centres (n, 2) of the fluid and the body.
+    cells
+        Cell centres (n, 2) of the fluid and the body, which fill a rectangle.
     body
         The body.
     solid
@@ -43,10 +43,11 @@ def pack(lattice: FloatArray, body: Polygon | MultiPolygon, solid: FloatArray, s
         Particle spacing Δx.
     """
     symmetric = is_symmetric(body)
-    count = round(len(lattice) - body.area / spacing**2)
-    height = _height(body, lattice)
-    far, near = lattice[height > BAND * spacing], lattice[(height <= BAND * spacing) & (height > -spacing)]
-    fixed = np.concatenate([_around(far, body, 3 * BAND * spacing), solid])
+    count = round(len(cells) - body.area / spacing**2)
+    height = _height(body, cells)
+    far, near = cells[height > BAND * spacing], cells[(height <= BAND * spacing) & (height > -spacing)]
+    sides = _around(_beyond(cells, spacing), body, 2 * BAND * spacing)
+    fixed = np.concatenate([_around(far, body, 3 * BAND * spacing), sides, solid])
     near = _thinned(near, fixed, count - len(far), spacing, symmetric)
     return np.asarray(np.concatenate([far, _spread(near, fixed, body, spacing, symmetric)]))
 
@@ -59,6 +60,15 @@ def _height(body: Polygon | MultiPolygon, points: FloatArray) -> FloatArray:
 
 def _around(points: FloatArray, body: Polygon | MultiPolygon, reach: float) -> FloatArray:
     return np.asarray(points[_height(body, points) < reach])
+
+
+def _beyond(cells: FloatArray, spacing: float) -> FloatArray:
+    """Return the cells around a rectangle of cells, which keep the particles at its sides within it."""
+    lower, upper = cells.min(axis=0), cells.max(axis=0)
+    counts, middle = np.rint((upper - lower) / spacing).astype(int) + 1, (lower + upper) / 2
+    margin = int(np.ceil(4 * WIDTH))
+    points = middle + lattice(*(symmetric_centres(count + 2 * margin, spacing) for count in counts))
+    return np.asarray(points[(np.abs(points - middle) > (upper - lower + spacing) / 2).any(axis=1)])
 
 
 def _mirror(points: FloatArray) -> NDArray[np.intp]:

@@ -37,6 +37,8 @@ def carried(shape: Polygon | MultiPolygon, spacing: float) -> Polygon | MultiPol
     tips = [shape.intersection(Point(corner).buffer(reach)) for corner in _wide_corners(shape)]
     near = [tip for tip in tips if tip.distance(core) <= radius * (1 / np.sin(WIDE / 2))]
     whole = shapely.union_all([opened, *near]).simplify(1e-4 * spacing)
+    parts = [part for part in shapely.get_parts(whole) if part.intersects(core)]  # the disc fits into no other
+    whole = parts[0] if len(parts) == 1 else MultiPolygon(parts)
     if not is_symmetric(shape):
         return whole
     left, _, right, top = whole.bounds
