@@ -9,7 +9,7 @@ import alsph
 import numpy as np
 import pytest
 from alsph import config
-from alsph.beginning import remarks, unlike
+from alsph.beginning import changed, remarks, unlike
 from alsph.cases import CASES, BackwardFacingStep, Cylinder, TaylorGreen
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError, RunFolderError, SolverError
@@ -415,6 +415,19 @@ def test_a_run_without_its_beginning_says_why_it_is_not_repeated(begun):
         alsph.repeat(begun, progress=False)
     with pytest.warns(RuntimeWarning, match="initial_run = None has no effect: the run has begun with '.*initial'"):
         resume(begun, until=0.06, progress=False)
+
+
+@pytest.mark.parametrize("path", ["initial", "initial/", "./initial"])
+def test_the_path_of_a_beginning_is_the_same_however_it_is_written_and_wherever_one_stands(tmp_path, monkeypatch, path):
+    folder = RunFolder(tmp_path / "run")
+    folder.path.mkdir()
+    Config(TaylorGreen(resolution=8), RunSettings(initial_run=path)).save(folder.path / "case.toml")
+    info = {"start": {"initial_run": path}}
+    assert folder.config().run.initial_run == path and changed(folder.config(), info) == []
+    (tmp_path / "initial").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert changed(folder.config(), info) == []
+    assert changed(folder.config(), {"start": {"initial_run": "other"}})
 
 
 def test_a_run_may_take_the_place_of_the_one_that_it_begins_with(tmp_path, small):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import reprlib
 import warnings
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,8 +20,6 @@ from alsph.io import RunFolder
 from alsph.results import Run
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from alsph.simulation import Simulation
 
 
@@ -104,7 +103,13 @@ def changed(config: Config, info: dict[str, Any]) -> list[str]:
     """Say if the run that one was to begin with has been changed since, which has no effect; `info` is ``run.json``."""
     now = config.run.initial_run
     before = info["start"].get("initial_run") if "start" in info else now  # an older alsph has no `start`
-    return [] if now == before else [f"initial_run = {now!r} has no effect: the run has begun with {before!r}"]
+    return (
+        [] if _same_path(now, before) else [f"initial_run = {now!r} has no effect: the run has begun with {before!r}"]
+    )
+
+
+def _same_path(one: str | None, two: str | None) -> bool:
+    return one == two or (one is not None and two is not None and Path(one) == Path(two))
 
 
 def alike(config: Config, kept: Config, folder: RunFolder, info: dict[str, Any]) -> bool:
@@ -117,11 +122,11 @@ def alike(config: Config, kept: Config, folder: RunFolder, info: dict[str, Any])
 def _same_flow(config: Config, kept: Config, info: dict[str, Any]) -> bool:
     initial, recorded = config.run.initial_run, info.get("start", {}).get("flow_sha256")
     if initial is None or recorded is None:  # an older alsph did not record it
-        return initial == kept.run.initial_run
+        return _same_path(initial, kept.run.initial_run)
     try:
         return bool(flow_sha256(Run(initial)) == recorded)
     except RunFolderError:  # it is gone, and not needed any more
-        return initial == kept.run.initial_run
+        return _same_path(initial, kept.run.initial_run)
 
 
 def _same_inflow(config: Config, folder: RunFolder, info: dict[str, Any]) -> bool:

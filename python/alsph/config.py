@@ -144,9 +144,9 @@ def _check_places(model: type[cases.Case], parameters: dict[str, Any], run: dict
 
 
 def _found(path: str, folders: tuple[Path, ...]) -> str:
-    """Return a path in the first of some folders that has it; in the first one if none has."""
+    """Return a path in the first of some folders that has it; as it is if none has."""
     paths = [folder / path for folder in folders or (Path(),)]
-    return str(next((path for path in paths if os.path.exists(path)), paths[0]))
+    return str(next((path for path in paths if os.path.exists(path)), path))
 
 
 def load(path: str | Path, *folders: Path) -> Config:
