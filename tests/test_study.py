@@ -431,6 +431,14 @@ def test_the_studies_that_come_with_alsph_ask_for_what_there_is(name):
     study.check_names(declared, declared.points())
 
 
+def test_how_runs_were_averaged_can_be_tabulated_and_not_drawn():
+    declared = declare(collect=["averaging rule"])
+    study.check_names(declared, declared.points())
+    drawn = declare(figures=[Figure(name="rule", x="reynolds", y=["averaging rule"])])
+    with pytest.raises(ConfigError, match="figure rule, y: no result 'averaging rule'"):
+        study.check_names(drawn, drawn.points())
+
+
 def test_remarks_on_a_run_stand_beside_its_results(tmp_path):
     sweep = Sweep(product={"smoothing_ratio": [1.1, 1.25]})
     figures = [Figure(name="decay", x="smoothing_ratio", y=[DECAY])]

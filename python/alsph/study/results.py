@@ -37,7 +37,9 @@ OF_ALL_RUNS = (
     "mean time step, ΔtU/Δx",
     "mean iterations",
 )
-"""Results that runs of every case have."""
+"""Numbers that runs of every case have."""
+RULE = "averaging rule"
+"""A result of all runs that is a text, and so not to be drawn."""
 
 
 def check_names(study: Study, points: Sequence[Point]) -> None:
@@ -54,7 +56,7 @@ def check_names(study: Study, points: Sequence[Point]) -> None:
         measures, curves = names(config)
         results.update(measures)
         profiles.update(curves)
-    wanted = [("collect", name, results) for name in study.collect]
+    wanted = [("collect", name, results | {RULE}) for name in study.collect]
     for figure in study.figures:
         wanted += [(f"figure {figure.name}, y", name, results) for name in figure.curves]
         wanted += [(f"figure {figure.name}, profile", name, profiles) for name in filter(None, [figure.profile])]
@@ -341,7 +343,7 @@ def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, fl
             float(np.mean(history["time_step"])) / run.spacing,
             float(np.mean(history["iterations"])),
         )
-        results |= {"averaging rule": run.window.rule} | dict(zip(OF_ALL_RUNS, numbers, strict=True))
+        results |= {RULE: run.window.rule} | dict(zip(OF_ALL_RUNS, numbers, strict=True))
         return results, known, {"remarks": keywords(run.remarks)} if run.remarks else {}
     except (AlsphError, KeyError) as error:
         return {"message": str(error)}, {}, {}
