@@ -90,7 +90,7 @@ fn viewpoint<const D: usize>(particles: &Particles<D>, i: usize) -> Vector<D> {
 /// between the two.
 fn on_face<const D: usize>(particles: &Particles<D>, s: usize, twin: usize, place: &Vector<D>) -> f64 {
     let Particles { position, normal, depth, .. } = particles;
-    let thickness = depth[s] + depth[twin];
+    let thickness = (depth[s] + depth[twin]).max(f64::MIN_POSITIVE); // zero where nobody has told the depths
     let higher = (place - position[s]).dot(&(normal[s] - normal[twin])) - (depth[s] - depth[twin]);
     let t = (0.5 + 0.5 * higher / thickness).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
