@@ -6,6 +6,7 @@ import pytest
 import shapely
 from alsph import Run, remarks
 from alsph.cases import CASES, BackwardFacingStep, Body, Cavity, Cylinder, Poiseuille, TaylorGreen
+from alsph.thin import carried
 from shapely import affinity
 from synthetic import write_run
 
@@ -121,6 +122,16 @@ def test_what_is_cut_off_a_body_and_thin_bodies_are_remarked_upon():
     (cut,) = said(80, shape="naca0012")
     assert "thin parts" in cut
     assert said(10) == said(8) == []
+
+
+@pytest.mark.parametrize(("length", "cut_off"), [(0.1, 0.03), (1.0, 0.49)])
+def test_a_body_that_falls_to_pieces_is_remarked_upon(length, cut_off):
+    """However short the part is that held them together, and though no corner of it lies far from them."""
+    one = shapely.box(0, 0, 1, 1)
+    bar, other = shapely.box(1, 0.45, 1 + length, 0.55), affinity.translate(one, 1 + length, 0)
+    shape = shapely.union_all([one, bar, other])
+    (cut,) = remarks.thin("body", shape, carried(shape, 0.1), 0.1)
+    assert cut.startswith("thin parts") and f"up to {cut_off} D of tips" in cut and "in 2 pieces" in cut
 
 
 def test_remarks_of_a_run(tmp_path):

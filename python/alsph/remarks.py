@@ -149,8 +149,13 @@ def protrusion(shape: Polygon | MultiPolygon, thickness: float) -> float:
     thicker = shape.buffer(-0.5 * thickness).buffer(0.5 * thickness)
     if thicker.is_empty:
         return math.inf
-    outline = shapely.get_coordinates(shapely.segmentize(shape, 0.5 * thickness))
-    return float(shapely.distance(thicker, shapely.points(outline)).max())
+    return reach(shape, thicker, 0.5 * thickness)
+
+
+def reach(shape: Polygon | MultiPolygon, rest: Polygon | MultiPolygon, step: float) -> float:
+    """Return how far [D] a shape reaches beyond what is left of it, by points of its outline up to `step` apart."""
+    outline = shapely.get_coordinates(shapely.segmentize(shape, step))
+    return float(shapely.distance(rest, shapely.points(outline)).max())
 
 
 def thinnest(shape: Polygon | MultiPolygon) -> float:
@@ -190,11 +195,12 @@ def thin(name: str, shape: Polygon, carried: Polygon | MultiPolygon, spacing: fl
             f"{TOO_THIN}: {text}; it takes {THINNEST:g} Δx, resolution = {math.ceil(THINNEST / thick - 0.05)} or more"
         ]
     found = []
-    tips = [shapely.hausdorff_distance(shape, carried), 1 - carried.area / shape.area]
-    if tips[0] > spacing:
-        text = (
-            f"cut off, for they are thinner than 2 Δx: up to {tips[0]:.2g} D of tips, {100 * tips[1]:.2g} % of the area"
-        )
+    length, area = reach(shape, carried, 0.5 * spacing), 1 - carried.area / shape.area
+    pieces = len(shapely.get_parts(carried))
+    if length > spacing or pieces > 1:
+        text = f"cut off, for they are thinner than 2 Δx: up to {length:.2g} D of tips, {100 * area:.2g} % of the area"
+        if pieces > 1:
+            text += f", so that the {name} is in {pieces} pieces, with flow between them"
         found.append(f"thin parts: {text}; they come back with resolution")
     if thick < 0.99 * THICK * spacing:
         text = f"{thick / spacing:.2g} Δx at its thickest; recorded lift and drag may be 10 to 20 % too small"
