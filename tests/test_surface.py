@@ -181,6 +181,9 @@ def test_moments_about_any_point(tmp_path):
     assert quarter.pressure + quarter.viscous == pytest.approx(quarter.mean)
     with pytest.raises(ConfigError, match="body = 'other': unknown; known: body"):
         run.moment(body="other")
+    for point in ((1, 2, 3), (1,), 1.0, "x", (0, float("nan"))):
+        with pytest.raises(ConfigError, match="about = .*: must be two numbers"):
+            run.moment(about=point)
 
 
 def test_the_chord_of_a_file_is_its_extent_and_normalises_moments(tmp_path):

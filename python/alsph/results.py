@@ -281,13 +281,13 @@ class Run:
         Raises
         ------
         ConfigError
-            If there is no such part or body.
+            If there is no such part or body, or `about` is no point.
         """
         case = self.config.case
         choose("part", part, ("total", "pressure", "viscous"))
         if body is not None:
             choose("body", body, self.bodies or [known["name"] for known in case.bodies()])
-        point = case.moment_point if about is None else np.array(about, float)
+        point = case.moment_point if about is None else _point("about", about)
         centres = {each["name"]: each["center"] for each in case.bodies()}
         missing = np.full(len(self.history["time"]), np.nan)
         moment = np.zeros_like(missing)
@@ -500,3 +500,14 @@ class Run:
     def _repr_html_(self) -> str:
         rows = ((html.escape(name), html.escape(printable(str(value)))) for name, value in self.summary().items())
         return "<table>" + "".join(f"<tr><th>{name}</th><td>{value}</td></tr>" for name, value in rows) + "</table>"
+
+
+def _point(name: str, value: Sequence[float]) -> FloatArray:
+    """Return a point (2,) that was given by its two coordinates."""
+    try:
+        point = np.array(value, float)
+    except (TypeError, ValueError):
+        point = np.empty(0)
+    if point.shape != (2,) or not np.isfinite(point).all():
+        raise ConfigError(f"{name} = {shown(value)}: must be two numbers, x and y [D]")
+    return point
