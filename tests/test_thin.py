@@ -1,3 +1,5 @@
+import time as clock
+
 import numpy as np
 import pytest
 import shapely
@@ -99,3 +101,13 @@ def test_nothing_is_carried_apart_from_where_a_disc_fits_in():
     box = shapely.box(-0.5, -0.5, 0.5, 0.5)
     carried = thin.carried(box.union(shapely.box(0.5, -0.03, 0.65, 0.03)), 0.1)
     assert carried.geom_type == "Polygon" and carried.symmetric_difference(box).area < 0.002
+
+
+def test_the_noise_of_a_measured_outline_has_no_corners():
+    """Each of them takes its time, and there may be thousands."""
+    angle = np.linspace(0, 2 * np.pi, 20_000, endpoint=False)
+    radius = 0.5 + 1e-4 * np.random.default_rng(0).normal(size=len(angle))
+    shape = shapely.Polygon(np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)).buffer(0)
+    began = clock.monotonic()
+    assert thin.carried(shape, 0.05).area == pytest.approx(np.pi / 4, rel=1e-3)
+    assert clock.monotonic() - began < 20

@@ -44,7 +44,7 @@ def pack(cells: FloatArray, body: Polygon | MultiPolygon, solid: FloatArray, spa
     """
     symmetric = is_symmetric(body)
     count = round(len(cells) - body.area / spacing**2)
-    height = _height(body, cells)
+    height = _height(body, cells, BAND * spacing)
     far, near = cells[height > BAND * spacing], cells[(height <= BAND * spacing) & (height > -spacing)]
     sides = _around(_beyond(cells, spacing), body, 2 * BAND * spacing)
     fixed = np.concatenate([_around(far, body, 3 * BAND * spacing), sides, solid])
@@ -52,14 +52,18 @@ def pack(cells: FloatArray, body: Polygon | MultiPolygon, solid: FloatArray, spa
     return np.asarray(np.concatenate([far, _spread(near, fixed, body, spacing, symmetric)]))
 
 
-def _height(body: Polygon | MultiPolygon, points: FloatArray) -> FloatArray:
-    """Return how far points (n, 2) lie outside the body, negative inside it."""
-    distance = shapely.distance(body.boundary, shapely.points(points))
-    return np.asarray(np.where(inside(body, points), -distance, distance))
+def _height(body: Polygon | MultiPolygon, points: FloatArray, reach: float = np.inf) -> FloatArray:
+    """Return how far points (n, 2) lie outside the body, negative inside; infinite beyond `reach` of its bounds."""
+    lower, upper = np.split(np.array(body.bounds), 2)
+    near = ((points >= lower - reach) & (points <= upper + reach)).all(axis=1)
+    distance = shapely.distance(body.boundary, shapely.points(points[near]))
+    height = np.full(len(points), np.inf)
+    height[near] = np.where(inside(body, points[near]), -distance, distance)
+    return height
 
 
 def _around(points: FloatArray, body: Polygon | MultiPolygon, reach: float) -> FloatArray:
-    return np.asarray(points[_height(body, points) < reach])
+    return np.asarray(points[_height(body, points, reach) < reach])
 
 
 def _beyond(cells: FloatArray, spacing: float) -> FloatArray:

@@ -12,6 +12,9 @@ THINNEST = 2.0
 WIDE = np.radians(75)
 """Corners of a wider inner angle stay sharp."""
 
+ROUGH = 0.01
+"""Depth of notches [Δx], such as the noise of measured outlines, whose edges are no corners."""
+
 OPPOSED = -0.85
 """Largest product of the unit normals of two faces of a thin part; its edges, where they turn away, have but one."""
 
@@ -34,7 +37,8 @@ def carried(shape: Polygon | MultiPolygon, spacing: float) -> Polygon | MultiPol
         return core
     opened = core.buffer(radius, quad_segs=32).intersection(shape)
     reach = radius / np.tan(WIDE / 2)  # where a disc in the corner touches its sides
-    tips = [shape.intersection(Point(corner).buffer(reach)) for corner in _wide_corners(shape)]
+    corners = _wide_corners(shape.simplify(ROUGH * spacing))
+    tips = [shape.intersection(Point(corner).buffer(reach)) for corner in corners]
     near = [tip for tip in tips if tip.distance(core) <= radius * (1 / np.sin(WIDE / 2))]
     whole = shapely.union_all([opened, *near]).simplify(1e-4 * spacing)
     parts = [part for part in shapely.get_parts(whole) if part.intersects(core)]  # the disc fits into no other
