@@ -14,7 +14,7 @@ from alsph.cases import CASES, BackwardFacingStep, Cylinder, TaylorGreen
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError, RunFolderError, SolverError
 from alsph.geometry import Kind
-from alsph.inflow import backflow, difference, fingerprint
+from alsph.inflow import Prescription, backflow, difference, fingerprint
 from alsph.io import RunFolder
 from alsph.run import Control, complete, resume, start
 from alsph.study.declaration import digest
@@ -228,6 +228,15 @@ def test_an_inflow_is_part_of_what_studies_compare(monkeypatch):
     monkeypatch.setattr(Pulsing, "inflow", lambda self, position, time: pulsation(position, 1.001 * time))
     assert digest(Config(case)) != first
     assert fingerprint(lambda position, time: None, case.domain(), 1.0)
+
+
+@pytest.mark.parametrize("velocity", ["1", [1.0, 0.0, 0.0], np.ones((3, 2))], ids=["text", "3-D", "rows"])
+def test_a_rule_that_gives_no_velocities_is_told_so_wherever_it_is_asked(small, velocity):
+    then = Prescription(0.1, np.zeros((5, 2)), np.ones((5, 2)))
+    with pytest.raises(ConfigError, match="inflow: the function must give 2 numbers"):
+        difference(lambda position, time: velocity, then)
+    with pytest.raises(ConfigError, match="inflow: the function must give 2 numbers"):
+        fingerprint(lambda position, time: velocity, small.domain(), 1.0)
 
 
 def test_checkpoints_without_a_rule_are_as_before(tmp_path, small):

@@ -41,6 +41,23 @@ class Prescription:
     velocity: FloatArray
 
 
+def _asked(rule: Inflow, position: FloatArray, time: float) -> FloatArray | None:
+    """Return the velocities (m, d) that a rule gives.
+
+    Raises
+    ------
+    ConfigError
+        If they are none.
+    """
+    velocity = rule(position.copy(), time)
+    try:
+        return None if velocity is None else np.broadcast_to(np.asarray(velocity, float), position.shape)
+    except (TypeError, ValueError):
+        raise ConfigError(
+            f"inflow: the function must give {position.shape[1]} numbers a position, or as many"
+        ) from None
+
+
 def difference(rule: Inflow | None, then: Prescription | None) -> str:
     """Say how a rule differs from the one that gave `then`, in words; return nothing if it does not."""
     if rule is None:
@@ -49,10 +66,10 @@ def difference(rule: Inflow | None, then: Prescription | None) -> str:
         return "an inflow function, of which the run did not tell before"
     if not len(then.position):
         return ""
-    now = rule(then.position.copy(), then.time)
+    now = _asked(rule, then.position, then.time)
     if now is None:
         return "an inflow function that gives no velocities"
-    change = float(np.abs(np.asarray(now, float) - then.velocity).max())
+    change = float(np.abs(now - then.velocity).max())
     if change <= 1e-12 * max(1.0, float(np.abs(then.velocity).max())):  # another mathematical library's rounding
         return ""
     return f"another inflow: at t* = {then.time:.6g} its velocities differ by up to {change:.3g} U"
@@ -67,7 +84,7 @@ def fingerprint(rule: Inflow, domain: dict[str, Any], until: float) -> str:
         axes = list(lower[:, None] + np.outer(upper - lower, shares))
         axes[axis] = np.array([plane])
         for share in (np.arange(SAMPLES) * 0.618034) % 1:  # no multiples of a period
-            velocity = rule(lattice(*axes), float(share * until))
+            velocity = _asked(rule, lattice(*axes), float(share * until))
             # In single precision, which no rounding of another mathematical library reaches.
             total.update(b"" if velocity is None else np.ascontiguousarray(velocity, np.float32).tobytes())
     return total.hexdigest()
