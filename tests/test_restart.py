@@ -230,7 +230,7 @@ def test_an_inflow_is_part_of_what_studies_compare(monkeypatch):
     assert fingerprint(lambda position, time: None, case.domain(), 1.0)
 
 
-@pytest.mark.parametrize("velocity", ["1", [1.0, 0.0, 0.0], np.ones((3, 2))], ids=["text", "3-D", "rows"])
+@pytest.mark.parametrize("velocity", ["fast", [1.0, 0.0, 0.0], np.ones((3, 2))], ids=["text", "3-D", "rows"])
 def test_a_rule_that_gives_no_velocities_is_told_so_wherever_it_is_asked(small, velocity):
     then = Prescription(0.1, np.zeros((5, 2)), np.ones((5, 2)))
     with pytest.raises(ConfigError, match="inflow: the function must give 2 numbers"):
