@@ -169,6 +169,13 @@ def test_pictures_and_information_carry_the_remarks(tmp_path, alsph):
     assert "remark" not in alsph("describe", "cylinder", "--no-probe")[1]
 
 
+def test_a_field_of_a_case_that_is_not_known_can_be_drawn(tmp_path):
+    path = write_run(tmp_path / "run")
+    text = (path / "case.toml").read_text()
+    (path / "case.toml").write_text(text.replace('case = "cylinder"', 'case = "ones_own"'))
+    assert "no remarks: case or history" in Run(path).plot_field("pressure").get_supxlabel()
+
+
 def test_a_figure_without_remarks_has_no_footer(tmp_path):
     case = Cylinder(reynolds=200, resolution=20)
     run = Run(write_run(tmp_path / "run", case))

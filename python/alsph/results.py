@@ -486,7 +486,11 @@ class Run:
         return self._saved(plotting.ledger(self), path)
 
     def _saved(self, figure: Figure, path: str | Path | None) -> Figure:
-        plotting.remark(figure, remarks.brief(self.remarks))
+        try:
+            said = remarks.brief(self.remarks)
+        except RunFolderError:  # a field can be drawn all the same
+            said = "no remarks: case or history of the run cannot be read"
+        plotting.remark(figure, said)
         if path is not None:
             plotting.save(figure, path)
         return figure
