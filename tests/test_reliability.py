@@ -98,6 +98,8 @@ def test_wall_times():
             seconds_of(text)
     with pytest.raises(ConfigError, match="walltime = 0"):
         Control(walltime=0)
+    with pytest.raises(ConfigError, match="walltime = '1:00:00': must be a number above zero"):
+        Control(walltime="1:00:00")
     with pytest.raises(ConfigError, match="retry = -1"):
         Control(retry=-1)
 

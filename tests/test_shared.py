@@ -139,6 +139,8 @@ def test_numbers_and_arrays_are_asked_for_in_plain_words(small):
         (lambda: simulation.advance(1.5), "steps = 1.5: must be a whole number"),
         (lambda: simulation.run_until("late"), "time = 'late': must be a number"),
         (lambda: simulation.run_until(float("nan")), "time = nan: must be a number"),
+        (lambda: next(simulation.steps(every="often")), "every = 'often': must be a number"),
+        (lambda: next(simulation.steps(0.1, until="late")), "until = 'late': must be a number"),
         (lambda: simulation.set_inflow("fast"), "array `inflow velocity`: must hold numbers"),
         (lambda: simulation.set_inflow([1.0]), "inflow velocity.*must have 2 components"),
         (lambda: simulation.sample("here"), "array `points`: must hold numbers"),

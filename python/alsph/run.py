@@ -26,6 +26,7 @@ from alsph.progress import Reporter, duration
 from alsph.provenance import describe, peak_memory, provenance
 from alsph.results import Run
 from alsph.simulation import SLICE_SECONDS, Simulation, next_multiple
+from alsph.text import shown
 
 RETRY_FACTOR = 0.5
 """By how much a retry shortens the time step and its share of the stability law."""
@@ -58,11 +59,11 @@ class Control:
 
     def __post_init__(self) -> None:
         """Refuse numbers without sense."""
-        object.__setattr__(self, "deadline", clock.monotonic() + self.walltime)
-        if not self.walltime > 0:
-            raise ConfigError(f"walltime = {self.walltime}: must be above zero [s]")
+        if not (isinstance(self.walltime, int | float | np.number) and self.walltime > 0):
+            raise ConfigError(f"walltime = {shown(self.walltime)}: must be a number above zero [s]")
         if not (isinstance(self.retry, int) and self.retry >= 0):
-            raise ConfigError(f"retry = {self.retry}: must be a whole number, 0 or more")
+            raise ConfigError(f"retry = {shown(self.retry)}: must be a whole number, 0 or more")
+        object.__setattr__(self, "deadline", clock.monotonic() + self.walltime)
 
 
 def start(config: Config, path: Path, control: Control | None = None, *, force: bool = False) -> Run:

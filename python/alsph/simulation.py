@@ -254,9 +254,9 @@ class Simulation:
 
     def steps(self, every: float, until: float | None = None) -> Iterator[dict[str, NDArray[Any]]]:
         """Step to the next multiple of `every` [D/U], yield a :meth:`snapshot`, and so on until `until`."""
-        if not 0 < every < math.inf:
+        if not 0 < _number("every", every) < math.inf:
             raise ConfigError(f"every = {every}: must be a positive number [D/U]")
-        until = self.until if until is None else until
+        until = self.until if until is None else _number("until", until)
         while self.time < until:
             self.run_until(min(next_multiple(self.time, every), until))
             yield self.snapshot()
