@@ -230,7 +230,7 @@ def surface_points(path: Path) -> Surface | None:
         if "position" not in file:
             return None
         names = [field.name for field in fields(Surface) if field.name in file]
-        arrays = {name: np.asarray(sound(file, name), float) for name in names}
+        arrays = {name: np.asarray(rows(sound(file, name, SURFACE_EXPANSION)), float) for name in names}
         for name, values in arrays.items():
             if values.shape != (arrays["angle"].size, 2)[: 2 if name in ("position", "normal") else 1]:
                 raise ValueError(f"{name} of shape {values.shape} does not match {arrays['angle'].size} points")
