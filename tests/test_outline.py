@@ -294,3 +294,12 @@ def test_a_typing_error_anywhere_is_refused_by_its_line(
     lines[where] = before + mistake + after
     with pytest.raises(ConfigError, match=rf"foil\.txt:{where + 1 + bool(title)}: "):
         read(tmp_path_factory.mktemp("foil"), title + "\n".join(lines) + "\n")
+
+
+def test_open_curves_that_may_be_one_body_or_two_are_refused(tmp_path):
+    path = tmp_path / "two.txt"
+    path.write_text("0 0\n1 0\n1 1\n0 1\n\n-.3 0\n-1.3 0\n-1.3 1\n-.3 1\n")
+    with pytest.raises(ConfigError, match='two.txt:6: "-.3 0": .*repeat its first point'):
+        Outline.read(path)
+    path.write_text("0 0\n1 0\n1 1\n0 1\n0 0\n\n-.3 0\n-1.3 0\n-1.3 1\n-.3 1\n-.3 0\n")
+    assert len(Outline.read(path).polygons) == 2

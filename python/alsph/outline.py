@@ -282,6 +282,10 @@ def _without_counts(parts: list[Part], name: str) -> list[Part]:
     return [part for part in parts if part.points]
 
 
+PLAIN = 0.1
+"""Parts of a file are one curve if the edges between them are shorter than this part of those that close each."""
+
+
 def _joined(parts: list[Part], name: str) -> list[list[Line]]:
     """Return the curves that the parts of a section make: those that the shortest edges close."""
     runs = [part.points for part in parts]
@@ -294,7 +298,13 @@ def _joined(parts: list[Part], name: str) -> list[list[Line]]:
         ways.insert(0, (both_ends, [one[::-1] + two for one, two in pairs]))
     if min(map(len, runs)) > 2:
         ways.insert(0, (math.fsum(_gap(run[-1], run[0]) for run in runs), runs))
-    curves = min(ways, key=lambda way: way[0])[1]
+    cost, curves = min(ways, key=lambda way: way[0])
+    apart = next((each for each, way in ways if way is runs), math.inf)
+    if curves is not runs and cost > PLAIN * apart:
+        fault = (
+            "begins a curve that may be one with the others, or a body of its own: repeat its first point at its end"
+        )
+        raise _refusal(name, runs[1][0], fault)
     title = next((part.before for part in parts[1:] if part.before.is_text), None)
     if title and curves is one_curve:
         raise _refusal(name, title, "text within a curve")
