@@ -193,6 +193,14 @@ class Run:
         """Name of the body in the flow that drag and lift are those of, or names of several; None between walls."""
         return ", ".join(self.config.case.coefficient_bodies) or None
 
+    def _chosen(self, body: str | None, part: str) -> tuple[list[str], tuple[str, ...]]:
+        """Return the bodies and the parts that a load is the sum of."""
+        choose("part", part, ("total", "pressure", "viscous"))
+        if body is not None:
+            choose("body", body, self.bodies or [known["name"] for known in self.config.case.bodies()])
+        names = [body] if body else self.config.case.coefficient_bodies or self.bodies[:1]
+        return names, ("pressure", "viscous") if part == "total" else (part,)
+
     def coefficient(self, axis: str, part: str = "total", body: str | None = None) -> FloatArray:
         """Force coefficient in every step, F / (½ρU²D).
 
@@ -217,12 +225,8 @@ class Run:
         axes = [name for name in AXES if name != "z" or self.config.case.space_dimensions == 3]
         if axis not in axes:
             raise ConfigError(f"axis = {shown(axis)}: unknown; known: {', '.join(axes)}; the drag is x and the lift y")
-        choose("part", part, ("total", "pressure", "viscous"))
-        if body is not None:
-            choose("body", body, self.bodies or [known["name"] for known in self.config.case.bodies()])
-        names = [body] if body else self.config.case.coefficient_bodies or self.bodies[:1] or [""]
-        parts = ("pressure", "viscous") if part == "total" else (part,)
-        columns = [self.history.get(f"{name}_{each}_force_{axis}") for each in parts for name in names]
+        names, parts = self._chosen(body, part)
+        columns = [self.history.get(f"{name}_{each}_force_{axis}") for each in parts for name in names or [""]]
         missing = np.full(len(self.history["time"]), np.nan)
         return 2.0 * sum((missing if column is None else column for column in columns), np.zeros_like(missing))
 
@@ -284,15 +288,13 @@ class Run:
             If there is no such part or body, or `about` is no point.
         """
         case = self.config.case
-        choose("part", part, ("total", "pressure", "viscous"))
-        if body is not None:
-            choose("body", body, self.bodies or [known["name"] for known in case.bodies()])
+        names, parts = self._chosen(body, part)
         point = case.moment_point if about is None else _point("about", about)
         centres = {each["name"]: each["center"] for each in case.bodies()}
         missing = np.full(len(self.history["time"]), np.nan)
         moment = np.zeros_like(missing)
-        for name in [body] if body else case.coefficient_bodies or self.bodies[:1]:
-            for each in ("pressure", "viscous") if part == "total" else (part,):
+        for name in names:
+            for each in parts:
                 moment += 2.0 * self.history.get(f"{name}_{each}_torque", missing)
             arm = np.subtract(centres.get(name, np.nan), point)
             moment += arm[0] * self.coefficient("y", part, name) - arm[1] * self.coefficient("x", part, name)
