@@ -128,8 +128,8 @@ struct Surroundings<V, const D: usize> {
 }
 
 impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
-    /// At r^{n+1}, over the neighbours in the frame of the last derivatives, those that are seen in part by their shares (`SHARED`). The distances in double precision: the rounding of
-    /// single would break the symmetry of a symmetric flow within a few steps.
+    /// At r^{n+1}, over the neighbours in the frame of the last derivatives; those that are seen in part count by their shares (`SHARED`).
+    /// The distances in double precision: the rounding of single would break the symmetry of a symmetric flow within a few steps.
     #[inline(always)]
     fn surroundings<V: Lanes, const SHARED: bool>(&self, cluster: Cluster, row: Row<'_>) -> Surroundings<V, D> {
         let in_frame = &self.stencil.position;

@@ -92,8 +92,8 @@ class Body(Channel):
     @property
     def thickness(self) -> float:
         """Extent of the bodies across the stream [D]."""
-        _, bottom, _, top = self.outline.bounds
-        return float(top - bottom)
+        _, bottom, _, top = self.bounds
+        return top - bottom
 
     @cached_property
     def carried(self) -> list[shapely.Polygon | shapely.MultiPolygon]:
