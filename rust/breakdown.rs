@@ -79,6 +79,9 @@ fn largest_volume(settings: &Settings) -> f64 {
 fn depth<const D: usize>(settings: &Settings, particles: &Particles<D>, frame: &Frame<D>, i: usize) -> f64 {
     let least = |j: usize| particles.depth[j] - (particles.position[j] - particles.position[i]).norm();
     let (row, lane) = frame.stencil.neighbours.row(i);
+    if row.solid().is_empty() {
+        return 0.0;
+    }
     // Of two at one place, the one whose face it is not on is deeper.
     let facing = row.solid_seen(lane).filter(|(_, share)| *share > 0.5).map(|(entry, _)| entry.j());
     facing.filter(|&j| frame.stencil.is_near(settings, i, j)).map(least).fold(0.0, f64::max)

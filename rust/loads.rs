@@ -1,7 +1,7 @@
 //! Force and torque of the fluid on each body.
 //!
-//! The pressure acts through Σ_s Σ_f V_s V_f (p_s + p_f) ∇_s W_sf over solid s and fluid f, the viscous stress through the
-//! compact Laplacian of the same pairs. Both are antisymmetric, so the solid's own pairs cancel and only fluid neighbours count. Their
+//! The pressure acts through Σ_s Σ_f V_s V_f (p_s + p_f) ∇_s W_sf over solid s and fluid f, p being what the velocity of the step had the
+//! gradient of ([`crate::scheme::Alsph::acting_pressure`]), and the viscous stress through the compact Laplacian of the same pairs. Both are antisymmetric, so the solid's own pairs cancel and only fluid neighbours count. Their
 //! sum is the momentum that the fluid gives. The viscous pairs feel the slope of the velocity over the width of a kernel. Where
 //! the velocity's slope at the surface is known, the viscous part is its shear over the area of the surface, and the pressure part the rest.
 
@@ -48,19 +48,20 @@ impl<const D: usize> Load<D> {
     }
 }
 
-/// The loads on every body, at the positions of `frame`.
+/// The loads on every body, at the positions of `frame`, where `pressure` acts on the particles.
 pub fn loads<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
     frame: &Frame<D>,
     walls: &Walls<D>,
+    pressure: impl Fn(usize) -> f64 + Sync,
 ) -> Vec<Load<D>> {
     let centers: Vec<_> = settings.bodies.iter().map(|body| Vector::<D>::from_column_slice(&body.center)).collect();
     let chunk = |range: std::ops::Range<usize>| {
         let mut loads = Vec::new();
         for s in range.filter(|&i| particles.kind[i] == ParticleKind::Solid) {
             loads.resize(centers.len(), Load::default());
-            let (pressure, viscous) = force_on(settings, particles, frame, walls, s);
+            let (pressure, viscous) = force_on(settings, particles, frame, walls, &pressure, s);
             let body = particles.body[s] as usize;
             let arm = particles.position[s] - centers[body];
             loads[body].add(&arm, pressure, &(arm + particles.normal[s] * particles.depth[s]), viscous);
@@ -84,6 +85,7 @@ fn force_on<const D: usize>(
     particles: &Particles<D>,
     frame: &Frame<D>,
     walls: &Walls<D>,
+    acting: &impl Fn(usize) -> f64,
     s: usize,
 ) -> (Vector<D>, Vector<D>) {
     let stencil = &frame.stencil;
@@ -94,7 +96,7 @@ fn force_on<const D: usize>(
         let f = entry.j();
         let slope = entry.slope(lane);
         let r_sf = stencil.position[s] - stencil.position[f];
-        pressure -= r_sf * (slope * (particles.pressure[s] + particles.pressure[f]));
+        pressure -= r_sf * (slope * (acting(s) + acting(f)));
         let dispersion = |i: usize| walls.dispersion.get(i).copied().unwrap_or_else(Vector::zeros);
         let relative = (particles.velocity[f] - dispersion(f)) - (walls.seen_by(particles, s, f) - dispersion(s));
         viscous += relative * (-slope * 2.0 * viscosity);

@@ -29,16 +29,29 @@ pub fn shift<const D: usize>(
         return;
     }
     frame.images.blank(change, particles.real);
-    with_kernel!(settings.kernel, K => {
-        let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
-        let stencil = &frame.stencil;
-        let displacement = Displacement { settings, kernel, particles, stencil, walls, time_step, velocity_max };
-        stencil.neighbours.for_each(change, &mut vec![(); particles.real], displacement);
-    });
+    let displacements = if frame.faces.is_empty() { displacements::<D, false> } else { displacements::<D, true> };
+    displacements(settings, particles, frame, walls, [time_step, velocity_max], change);
     let images = &frame.images;
     parallel::for_each(images.real(&mut particles.position), |i, r| *r += change[i].0);
     parallel::for_each(images.real(&mut particles.velocity), |i, u| *u += change[i].1);
     parallel::for_each(images.real(&mut particles.pressure), |i, p| *p += change[i].2);
+}
+
+/// The change of every particle; where there are faces (`SHARED`) neighbours count by the shares that are seen of them.
+fn displacements<const D: usize, const SHARED: bool>(
+    settings: &Settings,
+    particles: &Particles<D>,
+    frame: &Frame<D>,
+    walls: &Walls<D>,
+    [time_step, velocity_max]: [f64; 2],
+    change: &mut [Change<D>],
+) {
+    with_kernel!(settings.kernel, K => {
+        let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
+        let stencil = &frame.stencil;
+        let visitor = Displacement::<_, D, SHARED> { settings, kernel, particles, stencil, walls, time_step, velocity_max };
+        stencil.neighbours.for_each(change, &mut vec![(); particles.real], visitor);
+    });
 }
 
 /// δr, δr·∇u and δr·∇p.
@@ -53,7 +66,7 @@ impl<const D: usize> Poison for Change<D> {
 }
 
 /// Displacement of every particle if it were fluid.
-struct Displacement<'a, K, const D: usize> {
+struct Displacement<'a, K, const D: usize, const SHARED: bool> {
     settings: &'a Settings,
     kernel: Smoothing<K>,
     particles: &'a Particles<D>,
@@ -63,14 +76,10 @@ struct Displacement<'a, K, const D: usize> {
     velocity_max: f64,
 }
 
-impl<K: Kernel, const D: usize> Visit<Change<D>, ()> for Displacement<'_, K, D> {
+impl<K: Kernel, const D: usize, const SHARED: bool> Visit<Change<D>, ()> for Displacement<'_, K, D, SHARED> {
     #[inline(always)]
     fn visit<V: Lanes>(&self, cluster: Cluster, row: Row<'_>, out: &mut [Change<D>], _: &mut [()]) {
-        let Surroundings { asymmetry, relative, total, distances, count } = if row.shares().is_empty() {
-            self.surroundings::<V, false>(cluster, row)
-        } else {
-            self.surroundings::<V, true>(cluster, row)
-        };
+        let Surroundings { asymmetry, relative, total, distances, count } = self.surroundings::<V>(cluster, row);
         let (asymmetry, relative) = (vectors(asymmetry), vectors(relative));
         let (total, distances, count) = (total.store(), distances.store(), count.store());
         let Particles { velocity, pressure, kind, .. } = self.particles;
@@ -127,11 +136,10 @@ struct Surroundings<V, const D: usize> {
     count: V,
 }
 
-impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
-    /// At r^{n+1}, over the neighbours in the frame of the last derivatives; those that are seen in part count by their shares (`SHARED`).
-    /// The distances in double precision: the rounding of single would break the symmetry of a symmetric flow within a few steps.
+impl<K: Kernel, const D: usize, const SHARED: bool> Displacement<'_, K, D, SHARED> {
+    /// At r^{n+1}, over the neighbours in the frame of the last derivatives. The distances in double precision: the rounding of single would break the symmetry of a symmetric flow within a few steps.
     #[inline(always)]
-    fn surroundings<V: Lanes, const SHARED: bool>(&self, cluster: Cluster, row: Row<'_>) -> Surroundings<V, D> {
+    fn surroundings<V: Lanes>(&self, cluster: Cluster, row: Row<'_>) -> Surroundings<V, D> {
         let in_frame = &self.stencil.position;
         let Particles { position, velocity, .. } = self.particles;
         let here: [V; D] = cluster.vectors(position);
@@ -150,7 +158,7 @@ impl<K: Kernel, const D: usize> Displacement<'_, K, D> {
                 // The row also holds particles beyond the support of this lane, which must not count.
                 let mut inside = norm_squared(from(here_in_frame, &in_frame[j])).below(limit);
                 if SHARED {
-                    inside = inside * V::load_single(&row.shares()[2 * pair + k]);
+                    inside = inside * row.shares().get(2 * pair + k).map_or(V::splat(1.0), |shares| V::load_single(shares));
                 }
                 add_product(&mut asymmetry, inside * inverse * (inverse * inverse), r_ij);
                 distances = distances.plus_product(inside, q);

@@ -152,7 +152,8 @@ impl<const D: usize> Simulation<D> {
             self.restore_initial();
             return Err(error);
         }
-        let loads = loads(step.settings, &self.particles, &self.frame, &self.walls);
+        let acting = |i: usize| self.scheme.acting_pressure(step, &self.particles, i);
+        let loads = loads(step.settings, &self.particles, &self.frame, &self.walls, acting);
         let mut report = Report::new(step, outcome, &self.particles, &self.frame.stencil.volume, velocity_max, loads);
         self.scheme.advance_positions(step, &mut self.particles, &self.frame); // (12)
         self.walls.see_for_shift(step.settings, &self.particles, &self.frame);

@@ -93,7 +93,7 @@ fn seen<const D: usize>(settings: &Settings, set: &Set<D>) -> (Vec<Vec<f64>>, Lo
     let Set { particles, frame } = set;
     let mut walls = Walls::new(settings);
     walls.see(settings, particles, frame);
-    let load = loads(settings, particles, frame, &walls)[0];
+    let load = loads(settings, particles, frame, &walls, |i| particles.pressure[i])[0];
     walls.sharpen(settings, particles, frame, |i| particles.velocity[i] * particles.position[i][0], 1.0);
     let mut order: Vec<usize> = (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Solid).collect();
     order.sort_by_key(|&i| particles.id[i]);

@@ -5,6 +5,7 @@ use alsph::frame::{Frame, Travel};
 use alsph::kernel::{QuinticSpline, Smoothing};
 use alsph::neighbours::{Grid, brute_force_neighbours};
 use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient};
+use alsph::scheme::{Alsph, Step, relaxation};
 use alsph::shifting::shift;
 use alsph::{Clock, Matrix, ParticleKind, Particles, Settings, Simulation, Vector};
 use approx::assert_relative_eq;
@@ -146,6 +147,31 @@ fn a_step_is_that_of_the_equations() {
             let start = if frame == "initial" { set.particles.position[i] } else { set.frame.start[i] };
             let moved = after.position[i] - start - (set.particles.velocity[i] + velocity[i]) * (0.5 * TIME_STEP);
             assert_relative_eq!(moved, moved.map(f64::round), epsilon = 1e-12);
+        }
+    }
+}
+
+/// Without viscosity a step changes the velocity by the gradient of the acting pressure, with sweeps and without.
+#[test]
+fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
+    for sweeps in [0, 3] {
+        let mut value = settings("initial");
+        value["projection_sweeps"] = json!(sweeps);
+        value["kinematic_viscosity"] = json!(1e-15);
+        value["body_force"] = json!([0.0, 0.0]);
+        let settings = common::parse(&value);
+        let Set { mut particles, mut frame } = first_frame(&settings, box_of_fluid());
+        let before = particles.velocity.clone();
+        let (penalty, relaxation) = (0.05, relaxation(&settings));
+        let step = Step { settings: &settings, time_step: TIME_STEP, penalty, relaxation, dispersion: 0.0 };
+        let mut scheme = Alsph::default();
+        scheme.iterate(step, &mut particles, &mut frame, &mut Walls::new(&settings));
+        let acting: Vec<_> = (0..particles.len()).map(|i| scheme.acting_pressure(step, &particles, i)).collect();
+        assert!(acting.iter().zip(&particles.pressure).any(|(acting, p)| (acting - p).abs() > 1e-3), "nothing to be seen");
+        let set = Set { particles, frame };
+        for (i, gradient) in set.apply(Gradient(&acting)).into_iter().enumerate() {
+            let change = (set.particles.velocity[i] - before[i]) * (settings.density / TIME_STEP);
+            assert_relative_eq!(change, -gradient, epsilon = 1e-9);
         }
     }
 }

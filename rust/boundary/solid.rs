@@ -94,11 +94,13 @@ impl<const D: usize> Walls<D> {
         frame.images.vectors(dispersion);
         let basis = |n: f64| [1.0, n];
         let solids = profiles(settings, particles, &frame.stencil, dispersion, |_| Vector::zeros(), basis);
-        let dispersion_of_real = frame.images.real(dispersion);
-        for (s, profile) in solids {
-            dispersion_of_real[s] = value_at(profile, basis(-particles.depth[s] / settings.particle_spacing));
+        if !solids.is_empty() {
+            let dispersion_of_real = frame.images.real(dispersion);
+            for (s, profile) in solids {
+                dispersion_of_real[s] = value_at(profile, basis(-particles.depth[s] / settings.particle_spacing));
+            }
+            frame.images.vectors(dispersion);
         }
-        frame.images.vectors(dispersion);
     }
 
     /// Velocity of solid particle `s` in the viscous term of particle `i`. To one another solids show the wall's velocity.

@@ -49,8 +49,7 @@ impl Entry {
 pub struct Row<'a> {
     entries: &'a [Entry],
     flowing: usize,
-    shares: &'a [[f32; LANES]],
-    shared: &'a [[u32; 2]],
+    chunk: &'a Chunk,
     number: usize,
 }
 
@@ -74,7 +73,7 @@ impl<'a> Row<'a> {
     /// How much of each neighbour each particle of the cluster sees; empty if all of them see all.
     #[inline(always)]
     pub fn shares(&self) -> &'a [[f32; LANES]] {
-        shares_of(self.shares, self.shared, self.number)
+        shares_of(&self.chunk.shares, &self.chunk.shared, self.number)
     }
 
     /// The flowing neighbours that the particle of a lane sees any of, and how much.
@@ -169,8 +168,7 @@ impl Chunk {
     #[inline(always)]
     fn row(&self, row: usize) -> Row<'_> {
         let [start, solid] = self.starts[row];
-        let (shares, shared) = (&self.shares[..], &self.shared[..]);
-        Row { entries: &self.entries[self.range(row)], flowing: (solid - start) as usize, shares, shared, number: row }
+        Row { entries: &self.entries[self.range(row)], flowing: (solid - start) as usize, chunk: self, number: row }
     }
 
     #[inline(always)]

@@ -29,6 +29,8 @@ pub struct Alsph<const D: usize> {
     pub pressure_initial: Vec<f64>,
     /// ∇·u^m less [`Derived::solenoidal`], and p^m side by side, because (8) and (10) read them together.
     divergence_pressure: Vec<[f64; 2]>,
+    /// The same of the iteration before, as (8) had it.
+    divergence_pressure_before: Vec<[f64; 2]>,
     derived: Vec<Derived<D>>,
     /// What makes it of fourth order, once a step: minus the Laplacian of [`Walls::dispersion`]. Empty at second order.
     sharpening: Vec<Vector<D>>,
@@ -96,6 +98,7 @@ impl<const D: usize> Alsph<D> {
                 self.advance_positions(step, particles, frame); // (12): Algorithm 1 takes its derivatives at r^{n+1,m}
                 frame.update(step.settings, particles);
             }
+            std::mem::swap(&mut self.divergence_pressure, &mut self.divergence_pressure_before);
             self.velocity_derivatives(step, particles, frame, walls);
             self.check_images(particles, frame, walls);
             let (divergence_max, divergence_sum) = self.divergence_norms(particles); // (13)
@@ -105,6 +108,13 @@ impl<const D: usize> Alsph<D> {
             }
         }
         unreachable!("the loop ends at its cap")
+    }
+
+    /// What the velocity of the step had the gradient of: p^{n+1}, what the penalty term of (8) pushed with beside it, minus ρ r_AL ∇·u^m, and what
+    /// the pressure does not keep of the sweeps. The rest tends to zero with ∇·u, but where the flow turns sharply not in the mean.
+    pub fn acting_pressure(&self, step: Step, particles: &Particles<D>, i: usize) -> f64 {
+        let penalty = -step.settings.density * step.penalty * self.divergence_pressure_before[i][0];
+        particles.pressure[i] + penalty + self.projection.unkept(particles, i)
     }
 
     /// ∇·u of the last iteration.
@@ -120,6 +130,8 @@ impl<const D: usize> Alsph<D> {
         copy(&particles.pressure[..real], &mut self.pressure_initial);
         let images = &frame.images;
         images.blank(&mut self.divergence_pressure, count);
+        images.blank(&mut self.divergence_pressure_before, count);
+        self.projection.begin();
         images.blank(&mut self.derived, real);
         images.blank(&mut self.velocity_star, count);
         images.blank(&mut self.pressure_laplacian, real);

@@ -22,6 +22,9 @@ use crate::settings::Settings;
 /// pressure comes in over a few steps.
 const PRESSURE_SHARE: f64 = 0.5;
 
+/// What acts of a sweep's potential and is not kept, over what is.
+const UNKEPT: f64 = (1.0 - PRESSURE_SHARE) / PRESSURE_SHARE;
+
 /// What disordered particles may add to the largest eigenvalue of the lattice.
 const EIGENVALUE_MARGIN: f64 = 1.1;
 
@@ -34,9 +37,20 @@ pub fn relaxation(settings: &Settings) -> f64 {
 pub struct Projection {
     /// ∇·u, that of solids extrapolated (∂/∂n = 0) and none where pressure or velocity are prescribed.
     divergence: Vec<f64>,
+    /// p before the sweeps of this step; empty without any.
+    pressure_before: Vec<f64>,
 }
 
 impl Projection {
+    pub fn begin(&mut self) {
+        self.pressure_before.clear();
+    }
+
+    /// What the sweeps of this step pushed with, and the pressure has not kept.
+    pub fn unkept<const D: usize>(&self, particles: &Particles<D>, i: usize) -> f64 {
+        self.pressure_before.get(i).map_or(0.0, |before| UNKEPT * (particles.pressure[i] - before))
+    }
+
     /// All sweeps of one step. They take off what ∇·u has beyond [`Derived::solenoidal`].
     pub fn sweep<const D: usize>(
         &mut self,
@@ -45,6 +59,7 @@ impl Projection {
         frame: &Frame<D>,
         derived: &[Derived<D>],
     ) {
+        self.pressure_before.extend_from_slice(&particles.pressure);
         let Step { settings, time_step, relaxation, .. } = step;
         let Particles { real, kind, position, pressure, velocity, .. } = particles;
         let (kind, position) = (&kind[..*real], &*position);

@@ -1,0 +1,20 @@
+"""The loads that a run records are those of the flow: the momentum balance of boxes around the body gives the same."""
+
+import pytest
+from balance import body, loads
+
+
+@pytest.mark.parametrize(
+    "shape, options, start, until, tolerance",
+    [
+        ("circle", {"resolution": 10}, 0.5, 1.25, 0.03),
+        ("square_cylinder", {"resolution": 10}, 0.5, 1.25, 0.03),
+        ("ellipse_0.4", {"resolution": 12, "angle_of_attack": 15.0}, 0.8, 1.6, 0.03),
+        ("plate_0.3", {"resolution": 10}, 0.5, 1.25, 0.03),
+        ("naca0012", {"resolution": 20, "angle_of_attack": 10.0, "reynolds": 500.0}, 0.4, 0.8, 0.08),
+    ],
+)
+def test_recorded_loads_are_the_momentum_that_the_flow_loses(shape, options, start, until, tolerance):
+    found = loads(body(shape, **options), start, until)
+    largest = abs(found.boxes).max()
+    assert found.recorded == pytest.approx(found.boxes, abs=tolerance * largest), (found.recorded, found.spread)
