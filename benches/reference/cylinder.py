@@ -1,10 +1,9 @@
 """Compare the whole flow past the cylinder, not only its forces, with finite elements from a common start.
 
-`solve` computes the flow at Re = 200 in the paper's channel with NGSolve (velocity of order 4, pressure of order 3,
-curved elements, second-order time stepping with an explicit convective term), started as the case is; it needs an
-environment of its own. `compare` starts alsph with that field at t* = 2, when the boundary layers are there and the
-pressure waves of the impulsive start are not, and prints at every half time unit forces, those of the reference in
-brackets, and errors of the velocity within 2 D of the centre.
+`solve` computes the flow at Re = 200 in the paper's channel with NGSolve (`finite_elements.py`), started as the case
+is; it needs an environment of its own. `compare` starts alsph with that field at t* = 2, when the boundary layers are
+there and the pressure waves of the impulsive start are not, and prints at every half time unit forces, those of the
+reference in brackets, and errors of the velocity within 2 D of the centre.
 
     python -m venv fem && fem/bin/pip install ngsolve
     fem/bin/python benches/reference/cylinder.py solve --until 6 --resolutions 20 30 -o fields.npz
@@ -41,6 +40,7 @@ def comparison_points() -> np.ndarray:
 def solve(until: float, resolutions: list[int], output: Path, step: float = 0.002) -> None:
     """Write the forces, the velocity at the points of comparison, and at t* = 2 the fields at the cell centres."""
     import ngsolve as ng
+    from finite_elements import Flow
     from netgen.occ import Circle, Glue, MoveTo, OCCGeometry
 
     channel = MoveTo(0, -HEIGHT / 2).Rectangle(LENGTH, HEIGHT).Face()
@@ -50,66 +50,24 @@ def solve(until: float, resolutions: list[int], output: Path, step: float = 0.00
     wake = MoveTo(UPSTREAM - 1, -1.5).Rectangle(LENGTH - UPSTREAM + 1, 3).Face()
     near, disc = (Circle((UPSTREAM, 0), radius).Face() for radius in (1.0, RADIUS))
     wake.faces.maxh, near.faces.maxh = 0.22, 0.13
-    disc.edges.name, disc.edges.maxh = "cylinder", 0.08
+    disc.edges.name, disc.edges.maxh = "body", 0.08
     parts = Glue([channel - wake - near - disc, wake - near - disc, near - disc])
     mesh = ng.Mesh(OCCGeometry(parts, dim=2).GenerateMesh(maxh=0.8, grading=0.3)).Curve(5)
-
-    velocity = ng.VectorH1(mesh, order=4, dirichletx="inlet|cylinder", dirichlety="inlet|side|cylinder")
-    space = velocity * ng.H1(mesh, order=3)
-    (u, p), (v, q) = space.TnT()
-    viscous = ng.InnerProduct(ng.Grad(u) + ng.Grad(u).trans, ng.Grad(v)) / REYNOLDS
-
-    def implicit(factor: float):
-        form = ng.BilinearForm(space, symmetric=True)
-        form += (viscous - ng.div(u) * q - ng.div(v) * p + factor / step * u * v) * ng.dx
-        form.Assemble()
-        return form.mat, form.mat.Inverse(space.FreeDofs(), inverse="sparsecholesky")
-
-    mass = ng.BilinearForm(space)
-    mass += u * v * ng.dx
-    mass.Assemble()
-    flow, inflow = ng.GridFunction(space), ng.GridFunction(space)
-    uh, ph = flow.components
     x, y = (ng.x - UPSTREAM) / 0.6, ng.y / 0.6
     swirl = PERTURBATION * ng.exp(0.5 * (1 - x * x - y * y))
-    uh.Set(ng.CoefficientFunction((1 - swirl * y, swirl * x)))
-    inflow.components[0].Set(ng.CoefficientFunction((1, 0)), definedon=mesh.Boundaries("inlet"))
-    convection = ng.LinearForm(space)
-    convection += ng.InnerProduct(ng.Grad(uh) * uh, v) * ng.dx
-    into_body = ng.CoefficientFunction(((UPSTREAM - ng.x) / RADIUS, -ng.y / RADIUS))
-    stress = ng.BoundaryFromVolumeCF((ng.Grad(uh) + ng.Grad(uh).trans) / REYNOLDS)
-
-    def forces() -> list[float]:
-        traction = stress * into_body
-        parts = ng.CoefficientFunction((ph * into_body[0], -traction[0], ph * into_body[1] - traction[1]))
-        values = ng.Integrate(parts, mesh, ng.BND, definedon=mesh.Boundaries("cylinder"), order=12)
-        return [2 * value for value in values]
+    flow = Flow(mesh, REYNOLDS)
+    flow.velocity.Set(ng.CoefficientFunction((1 - swirl * y, swirl * x)))
 
     def at(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         found = mesh(np.clip(points[:, 0], 1e-6, LENGTH - 1e-6), points[:, 1])
-        return np.array(uh(found)), np.array(ph(found)).ravel()
+        return np.array(flow.velocity(found)), np.array(flow.pressure(found)).ravel()
 
     saved: dict[str, np.ndarray] = {}
     history, snapshots, points_compared = [], [], comparison_points()
-    (first, first_inverse), (later, later_inverse) = implicit(1.0), implicit(1.5)
-    before, before_that, old_convection = flow.vec.Copy(), None, None
-    for n in range(1, round(until / step) + 1):
-        convection.Assemble()
-        right = flow.vec.CreateVector()
-        if before_that is None:
-            right.data = 1 / step * (mass.mat * before) - convection.vec
-            matrix, inverse = first, first_inverse
-        else:
-            right.data = 1 / step * (mass.mat * (2 * before - 0.5 * before_that))
-            right.data += old_convection - 2 * convection.vec
-            matrix, inverse = later, later_inverse
-        old_convection, before_that = convection.vec.Copy(), before
-        right.data -= matrix * inflow.vec
-        flow.vec.data = inflow.vec + inverse * right
-        before = flow.vec.Copy()
-        time = n * step
+    for n, time in enumerate(flow.march(until, step), start=1):
         if n % 10 == 0:
-            history.append([time, *forces()])
+            _, *parts, lift, _, _ = flow.loads()
+            history.append([time, *parts, lift])
         if n % round(EVERY / step) == 0:
             snapshots.append((time, at(points_compared)[0]))
             print(

@@ -1,0 +1,111 @@
+"""Incompressible flow past bodies in a channel with NGSolve: what the reference solutions here share.
+
+Velocity of order 4 and pressure of order 3 on curved elements. In time, second-order backward differences with an
+extrapolated convective term. At the outlet the traction vanishes (natural condition); the side walls let slip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import ngsolve as ng
+from ngsolve.nonlinearsolvers import Newton
+
+HOLD = 16
+"""The step may be doubled when this many of it have been taken."""
+
+
+class Flow:
+    """Velocity and pressure on a mesh whose boundaries are named inlet, outlet, side and body; U = ρ = 1.
+
+    Parameters
+    ----------
+    mesh
+        The mesh, curved.
+    reynolds
+        UD/ν.
+    order
+        Order of the velocity's elements; that of the pressure's is one less.
+    inflow
+        The velocity (2,) at the inlet [U].
+    """
+
+    def __init__(
+        self,
+        mesh: ng.Mesh,
+        reynolds: float,
+        order: int = 4,
+        inflow: tuple[ng.CoefficientFunction | float, ...] = (1, 0),
+    ) -> None:
+        self.mesh, self.body = mesh, mesh.Boundaries("body")
+        velocity = ng.VectorH1(mesh, order=order, dirichletx="inlet|body", dirichlety="inlet|side|body")
+        self.space = velocity * ng.H1(mesh, order=order - 1)
+        self.flow, self._inflow = ng.GridFunction(self.space), ng.GridFunction(self.space)
+        self.velocity, self.pressure = self.flow.components
+        self._inflow.components[0].Set(ng.CoefficientFunction(inflow), definedon=mesh.Boundaries("inlet"))
+        self.flow.vec.data = self._inflow.vec
+        (u, p), (v, q) = self.space.TnT()
+        viscous = ng.InnerProduct(ng.Grad(u) + ng.Grad(u).trans, ng.Grad(v)) / reynolds
+        self._stokes = viscous - ng.div(u) * q - ng.div(v) * p
+        self._inertia, self._transport = u * v, ng.InnerProduct(ng.Grad(u) * u, v)
+        self._convection = ng.LinearForm(self.space)
+        self._convection += ng.InnerProduct(ng.Grad(self.velocity) * self.velocity, v) * ng.dx
+        self._residual = self.flow.vec.CreateVector()
+        self._shifts = []  # of the body, along x and y
+        for direction in ((1, 0), (0, 1)):
+            shift = ng.GridFunction(self.space)
+            shift.components[0].Set(ng.CoefficientFunction(direction), definedon=self.body)
+            self._shifts.append(shift)
+
+    def march(self, until: float, step: float, doublings: int = 0) -> Iterator[float]:
+        """Go on from the velocity at t* = 0, which may slip on the body, to `until`; yield the time after each step.
+
+        The first steps are ``step / 2**doublings``, as the layers of an impulsive start are thin.
+        """
+        mass = ng.BilinearForm(self._inertia * ng.dx).Assemble().mat
+        right = self.flow.vec.CreateVector()
+        now, time, states, convections = step / 2**doublings, 0.0, [], []  # the newest first
+        while time < until - now / 2:
+            self._convection.Assemble()
+            states = [self.flow.vec.Copy(), *states[:2]]
+            convections = [self._convection.vec.Copy(), *convections[:2]]
+            doubled = now < step and round(time / now) == HOLD
+            if doubled:
+                now, states, convections = 2 * now, states[::2], convections[::2]
+            if len(states) == 1:
+                matrix, inverse, given = self._implicit(1 / now)
+                right.data = 1 / now * (mass * states[0]) - convections[0]
+            else:
+                if doubled or len(states) == 2:
+                    matrix, inverse, given = self._implicit(1.5 / now)
+                right.data = 1 / now * (mass * (2 * states[0] - 0.5 * states[1])) + convections[1] - 2 * convections[0]
+            self.flow.vec.data = self._inflow.vec + inverse * (right - given)
+            self._residual.data = matrix * self.flow.vec - right
+            time += now
+            yield time
+
+    def settle(self) -> None:
+        """Go on to the steady flow, by Newton's method."""
+        form = ng.BilinearForm((self._stokes + self._transport) * ng.dx)
+        Newton(form, self.flow, inverse="umfpack", maxerr=1e-10, printing=False)
+        form.Apply(self.flow.vec, self._residual)
+
+    def loads(self) -> list[float]:
+        """Return drag, its pressure and its viscous part, and those of the lift, with ½ρU²D.
+
+        The whole is what the momentum equation lacks on the body, which is more exact at corners than an integral over
+        the surface, as which the pressure's part is found; the viscous one is the rest.
+        """
+        loads = []
+        for shift in self._shifts:
+            moved = shift.components[0]
+            density = ng.Grad(self.pressure) * moved + self.pressure * ng.div(moved)
+            whole, pressure = -ng.InnerProduct(self._residual, shift.vec), ng.Integrate(density, self.mesh)
+            loads += [2 * whole, 2 * pressure, 2 * (whole - pressure)]
+        return loads
+
+    def _implicit(self, rate: float) -> tuple[ng.BaseMatrix, ng.BaseMatrix, ng.BaseVector]:
+        """Return matrix and inverse of the implicit terms, and what they make of the velocity that is given."""
+        form = ng.BilinearForm((self._stokes + rate * self._inertia) * ng.dx, symmetric=True).Assemble()
+        inverse = form.mat.Inverse(self.space.FreeDofs(), inverse="sparsecholesky")
+        return form.mat, inverse, (form.mat * self._inflow.vec).Evaluate()
