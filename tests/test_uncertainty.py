@@ -10,7 +10,7 @@ from scipy import optimize, stats
 
 
 def fitted(shape, averages):
-    """Return constant and its variance for a unit residual, slope and its, and residuals of such a line through shape."""
+    """Return constant and its variance for a unit residual, slope and its, and residuals of a line."""
     columns = np.stack([np.ones(len(averages)), shape], axis=1)
     found = np.linalg.lstsq(columns, averages, rcond=None)[0]
     spread = np.diag(np.linalg.inv(columns.T @ columns))

@@ -205,3 +205,11 @@ def test_noise_is_told_by_the_later_half_and_the_begin_of_the_clock_by_nothing()
         here, later = averaging_window(TIME, drag, signal), averaging_window(1000 + TIME, drag, signal)
         assert later.edges == pytest.approx(1000 + here.edges, abs=1e-6)
         assert (later.rule, later.growing) == (here.rule, here.growing)
+
+
+def test_three_samples_make_a_window():
+    none = averaging_window(TIME[:2], TIME[:2], TIME[:2])
+    assert (none.edges.size, none.periods, none.settled, none.growing) == (0, 0, False, False)
+    assert none.rule == "no window: fewer than three samples" and np.isnan([none.start, none.end]).all()
+    three = averaging_window(TIME[:3], 1 + 0 * TIME[:3], 0 * TIME[:3])
+    assert (three.start, three.end) == pytest.approx((0.01, 0.02))
