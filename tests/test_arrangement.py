@@ -161,7 +161,8 @@ def test_a_body_falls_to_pieces_where_a_disc_does_not_pass():
 
 
 def test_thickness_is_that_of_the_largest_disc():
-    for shape, width in ((shapely.box(0, 0, 3, 0.4), 0.4), (shapely.Point(0, 0).buffer(0.5), 1.0), (SQUARE, 1.0)):
+    right_angled = shapely.Polygon([(0, 0), (4, 0), (0, 3)])
+    for shape, width in ((right_angled, 2.0), (shapely.box(0, 0, 3, 0.4), 0.4), (shapely.Point(0, 0).buffer(0.5), 1.0)):
         assert thin.thickness(shape) == pytest.approx(width, rel=5e-3)
 
 
