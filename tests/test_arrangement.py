@@ -161,8 +161,14 @@ def test_a_body_falls_to_pieces_where_a_disc_does_not_pass():
 
 
 def test_thickness_is_that_of_the_largest_disc():
+    angle = shapely.box(0, 0, 3, 0.4).union(shapely.box(0, 0, 0.4, 3))  # the disc in its corner has r = √2 (0.4 - r)
     right_angled = shapely.Polygon([(0, 0), (4, 0), (0, 3)])
-    for shape, width in ((right_angled, 2.0), (shapely.box(0, 0, 3, 0.4), 0.4), (shapely.Point(0, 0).buffer(0.5), 1.0)):
+    for shape, width in (
+        (angle, 0.8 * (2 - np.sqrt(2))),
+        (right_angled, 2.0),
+        (shapely.box(0, 0, 3, 0.4), 0.4),
+        (shapely.Point(0, 0).buffer(0.5), 1.0),
+    ):
         assert thin.thickness(shape) == pytest.approx(width, rel=5e-3)
 
 
