@@ -3,11 +3,12 @@
 PYTHON ?= python3
 BIN := .venv/bin
 TOOLS := .venv/.tools
+MUTMUT := target/mutmut
 EXTENSION := python/alsph/_alsph.abi3.so
 SOURCES := Cargo.toml Cargo.lock pyproject.toml $(shell find rust -name '*.rs')
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: build run test test-rust test-python test-validation validate bench clean
+.PHONY: build run test test-rust test-python test-validation validate bench clean mutants-python
 
 build: $(EXTENSION)
 
@@ -38,6 +39,15 @@ validate: $(EXTENSION)  ## Cases beside their reference solutions, in minutes on
 
 bench:
 	cargo bench
+
+mutants-python: $(EXTENSION) $(MUTMUT)  ## Faults put into the Python code one at a time, an hour or more.
+	$(MUTMUT)/bin/python benches/mutants.py $(MUTANTS)
+
+$(MUTMUT):  ## An environment of its own that sees the packages of .venv.
+	$(BIN)/python -m venv $@
+	$(BIN)/python -c "import sysconfig; print(sysconfig.get_path('purelib'))" > \
+	    $$($@/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/alsph-packages.pth
+	$@/bin/python -m pip install --quiet mutmut==3.8.1
 
 clean:
 	cargo clean

@@ -1,15 +1,17 @@
 import math
 import shutil
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
-from alsph import Run, reading, sampling
+from alsph import Run, analysis, reading, remarks, sampling
 from alsph.cases import Cylinder
 from alsph.config import Config
 from alsph.errors import ConfigError, RunFolderError
 from alsph.io import RunFolder
-from synthetic import CIRCULATION, DRAG, LIFT, STROUHAL, write_run
+from alsph.measures import Measure
+from synthetic import CIRCULATION, DRAG, LIFT, STROUHAL, signals, write_run
 
 
 @pytest.fixture(scope="module")
@@ -211,3 +213,148 @@ def test_bodies_are_known_before_the_first_step(tmp_path, small):
     assert run.coefficient("x", body="cylinder").size == 0
     with pytest.raises(ConfigError, match="body = 'wing': unknown; known: cylinder"):
         run.load("x", "wing")
+
+
+def test_coefficients_are_twice_the_forces_of_history(folder):
+    run = Run(folder)
+    time = run.history["time"]
+    drag, lift = signals(time, noise=0.01)
+    for axis, whole in (("x", drag), ("y", lift)):
+        assert run.coefficient(axis) == pytest.approx(whole, abs=1e-6)
+        assert run.coefficient(axis, "pressure") == pytest.approx(0.8 * whole, abs=1e-6)
+        assert run.coefficient(axis, "viscous", "cylinder") == pytest.approx(0.2 * whole, abs=1e-6)
+    assert run.load("y", "cylinder").amplitude == run.lift.amplitude
+    assert run.lift.pressure + run.lift.viscous == pytest.approx(run.lift.mean, abs=1e-9)
+    assert run.body == "cylinder" and run.bodies == ["cylinder"] and run.spacing == pytest.approx(0.1)
+    assert run._iterations() == "5 of at most 2, then 4 projection sweeps"
+
+
+def test_the_summary_of_a_run(folder):
+    run = Run(folder)
+    shown = {name: str(value) for name, value in run.summary().items()}
+    window = run.window
+    expected = {
+        "case": "cylinder",
+        "Reynolds number": "200",
+        "resolution, D/Δx": "10",
+        "status": "finished",
+        "computing time": "0 s",
+        "time reached, tU/D": f"{run.history['time'][-1]:.6g}",
+        "steps": "6000",
+        "iterations of a step": "5 of at most 2, then 4 projection sweeps",
+        "averaged from tU/D": f"{window.start:.6g}",
+        "averaged to tU/D": f"{window.end:.6g}",
+        "averaging rule": window.rule,
+        "shedding periods": str(window.periods),
+        "mean velocity divergence, |∇·u| D/U": "0.0005",
+        "largest velocity divergence, |∇·u| D/U": "0.5",
+    }
+    assert list(shown.items())[: len(expected)] == list(expected.items())
+    rest = list(shown.items())[len(expected) :]
+    measures = [(each.name, str(each.value)) for each in run.measures]
+    assert [
+        item for item in rest if not item[0].startswith("remark ") and not item[0].endswith(", reference")
+    ] == measures
+    assert [value for name, value in rest if name.startswith("remark ")] == run.remarks
+    assert ("remark 1", run.remarks[0]) in rest
+    info = run.info | {"message": "stopped by hand", "seconds": 3700.0}
+    run.info = info
+    later = run.summary()
+    assert later["message"] == "stopped by hand" and later["computing time"] != "0 s"
+
+
+def test_references_stand_behind_their_measures(folder):
+    run = Run(folder)
+    nothing = Measure("drag", 1.25, math.nan, 0.1), Measure("symmetry", 0.01, 0.0, 0.1)
+    run.measures = [Measure("lift", analysis.Estimate(0.5, 0.1), -2.0, 0.1), *nothing]
+    found = [(name, str(value)) for name, value in run.summary().items()]
+    first = found.index(("lift", "0.50 ± 0.10"))
+    assert found[first + 1 : first + 4] == [("lift, reference", "-2"), ("drag", "1.25"), ("symmetry", "0.01")]
+    assert found[first + 4][0] == "remark 1"
+
+
+def test_the_momentum_balance_is_of_the_snapshots_in_the_window(folder):
+    """A stream that is sped up by a pressure gradient, without a body: what comes in stays in."""
+    run = Run(folder)
+    run.times = np.array([0.0, 1.0, 2.0, 4.0, 9.0])
+    run.window = analysis.Window(np.array([1.0, 4.0]), 1, True, "")
+    first = run.snapshot(0.0)
+    position = first.position[first.fluid]
+    solid = np.arange(len(position)) % 7 == 0
+
+    def snapshot(time, push=1.0):
+        wild = 1.0 if 1 <= time <= 4 else 50.0
+        velocity = wild * 0.5 * time**2 * np.array([1.0, 0.5]) + 0 * position
+        pressure = wild * push * -time * (position @ [1.0, 0.5])
+        return SimpleNamespace(
+            position=position,
+            velocity=np.where(solid[:, None], 99, velocity),
+            pressure=np.where(solid, 99, pressure),
+            fluid=~solid,
+        )
+
+    run.snapshot = snapshot
+    box = (1.0, -3.0), (3.0, -1.0)
+    whole = 2 * 4 * 7.5 / 3 * np.array([1.0, 0.5])  # 2 V Δu / Δt, the fluid being all there
+    balance = run.momentum_balance(*box)
+    run.snapshot = lambda time: snapshot(time, 0.0)
+    unpushed = run.momentum_balance(*box)
+    # trapezia of the pressure's push, 2 V t: (1.5 + 2 * 3) / 3 = 2.5
+    assert balance - unpushed == pytest.approx(2 * 4 * 2.5 * np.array([1.0, 0.5]), rel=1e-6)
+    assert unpushed == pytest.approx(-whole * 6 / 7, rel=0.02)
+    run.window = analysis.Window(np.array([1.5, 3.0]), 1, True, "")
+    assert np.isnan(run.momentum_balance(*box)).all() and len(run.momentum_balance(*box)) == 2
+
+
+def test_points_and_boxes_that_are_none_are_refused(folder):
+    run = Run(folder)
+    for lower, upper in (((1, 2), (1, 3)), ((1, 2), (3, 2)), ((1, 2, 3), (2, 3, 4)), ((1, 2), (2, 3, 4))):
+        with pytest.raises(ConfigError, match="needs corners of 2 numbers, the lower one first"):
+            run.momentum_balance(lower, upper)
+    assert run.snapshot(26).time == 30 and run.snapshot(24).time == 20 and run.snapshot(-5.0).time == 0
+    for time in (math.nan, math.inf, "1"):
+        with pytest.raises(ConfigError, match="must be a finite number"):
+            run.snapshot(time)
+
+
+def test_figures_are_saved_where_they_shall_be_and_carry_the_remarks(folder, tmp_path):
+    run = Run(folder)
+    curve = np.arange(0.0, 181.0, 45.0), np.zeros(5)
+    for name, figure in (
+        ("forces", run.plot_forces(tmp_path / "forces.png")),
+        ("spectrum", run.plot_spectrum(tmp_path / "spectrum.png", "cylinder")),
+        ("field", run.plot_field("pressure", 30.0, tmp_path / "field.png", limit=0.25, view=(2, 6, -2, 2))),
+        ("surface", run.plot_pressure_coefficient(tmp_path / "surface.png", curve)),
+        ("ledger", run.plot_ledger(tmp_path / "ledger.png")),
+    ):
+        assert (tmp_path / f"{name}.png").stat().st_size > 1000
+        assert remarks.brief(run.remarks) in [text.get_text() for text in figure.texts]
+        if name == "field":
+            assert (figure.axes[0].get_xlim(), figure.axes[0].get_ylim()) == ((2, 6), (-2, 2))
+            assert "30" in figure.axes[0].get_title() + figure.axes[0].get_title("left")
+        if name == "surface":
+            assert any(np.array_equal(line.get_ydata(), curve[1]) for line in figure.axes[0].lines)
+    assert len(list(tmp_path.glob("*.png"))) == 5 and run.plot_forces().axes
+
+
+@pytest.mark.parametrize("status", ["starting", "running"])
+def test_a_run_without_a_process_is_stopped(damaged, monkeypatch, status):
+    (damaged / "run.json").write_text(f'{{"status": "{status}", "case": "cylinder"}}')
+    whole = "no process is at work in it, it was killed or its machine went down; go on with: "
+    stopped = Run(str(damaged))
+    assert (stopped.status, stopped.info["message"]) == ("stopped", f"{whole}alsph run, with --force")
+    (damaged / "checkpoint.h5").write_bytes(b"")
+    assert Run(damaged).info == {
+        "status": "stopped",
+        "case": "cylinder",
+        "message": f"{whole}alsph resume {damaged}",
+    }
+    for busy in (True, None):
+        monkeypatch.setattr(RunFolder, "is_busy", lambda self, busy=busy: busy)
+        assert Run(damaged).status == status and "message" not in Run(damaged).info
+    monkeypatch.setattr(
+        RunFolder, "is_busy", lambda self: (damaged / "run.json").write_text('{"status": "finished"}') < 0
+    )
+    assert Run(damaged).status == "finished" and "message" not in Run(damaged).info
+    (damaged / "run.json").write_text("{}")
+    assert Run(damaged).status == "unknown"

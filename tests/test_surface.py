@@ -195,3 +195,54 @@ def test_the_chord_of_a_file_is_its_extent_and_normalises_moments(tmp_path):
     run = write_body(tmp_path / "run", case, lambda surface: surface.side, torque=0.25)
     assert run.moment_coefficient(about=(4.0, 0.0)) == pytest.approx(-0.5 / 4)
     assert Cylinder().moment_point == pytest.approx([4, 0])
+
+
+def test_four_pieces_of_a_circle():
+    found = circle(2.0, 4)
+    assert found.angle.tolist() == [0, 90, 180, 270] and found.side.tolist() == [1, 1, 1, -1]
+    assert found.position == pytest.approx(np.array([[-2, 0], [0, 2], [2, 0], [0, -2]]))
+    assert found.normal == pytest.approx(found.position / 2)
+    assert found.length == pytest.approx(4 * [np.pi]) and found.arc == pytest.approx([0, np.pi, 2 * np.pi, np.pi])
+    assert found.part.tolist() == [0, 0, 0, 0] and "chord" not in found.arrays()
+    assert set(along(TWO).arrays()) == {*found.arrays(), "chord"}
+    moved = found.moved(np.array([10.0, 20.0]))
+    assert moved.position == pytest.approx(found.position + [10, 20]) and moved.normal is found.normal
+
+
+def test_the_pieces_of_a_box_go_around_it_from_the_middle_of_its_front():
+    box = shapely.box(-1, -0.5, 2, 0.5)
+    pieces = along(box)
+    count = len(pieces.arc) // 2
+    assert pieces.length.max() < 8 / 144 + 1e-9 and pieces.length.min() > 0.5 * 8 / 144
+    upper, lower = pieces.side[:count], pieces.side[count:]
+    assert (upper == 1).all() and (lower == -1).all() and len(lower) == count
+    walked = np.cumsum(pieces.length) - pieces.length / 2
+    assert pieces.arc == pytest.approx(np.where(pieces.side > 0, walked, 8 - walked))
+    x, y = pieces.position.T
+    across = np.abs(x - 0.5) > 1.5 - 1e-9
+    assert pieces.arc[across] == pytest.approx(np.where(x[across] < 0, np.abs(y[across]), 4 - np.abs(y[across])))
+    assert pieces.arc[~across] == pytest.approx(x[~across] + 1.5)
+    assert pieces.normal[across] == pytest.approx(np.stack([np.sign(x[across]), 0 * x[across]], axis=1))
+    assert pieces.normal[~across] == pytest.approx(np.stack([0 * y[~across], np.sign(y[~across])], axis=1))
+    assert pieces.chord == pytest.approx((x + 1) / 3)
+    assert pieces.angle == pytest.approx(np.degrees(np.arctan2(y, -x)) % 360)
+    assert pieces.angle[0] < 10 and pieces.angle[-1] > 350
+    assert along(box, chord=(-2.0, 3.0)).chord == pytest.approx((x + 2) / 5)
+
+
+@pytest.mark.parametrize("turn", [25.0, -100.0])
+@pytest.mark.parametrize("orient", [1, -1])
+def test_pieces_turn_with_their_body_whichever_way_it_is_drawn(turn, orient):
+    body = shapely.Polygon([(0, 0), (3, 0.5), (3, 1), (1, 2)][::orient])
+    upright, turned = along(body), along(affinity.rotate(body, -turn, origin=(0, 0)), turn)
+    back = affinity.rotate(shapely.MultiPoint(turned.position), turn, origin=(0, 0))
+    assert shapely.get_coordinates(back) == pytest.approx(upright.position)
+    back = affinity.rotate(shapely.MultiPoint(turned.normal), turn, origin=(0, 0))
+    assert shapely.get_coordinates(back) == pytest.approx(upright.normal)
+    for name in ("length", "part", "side", "arc", "chord"):
+        assert getattr(turned, name) == pytest.approx(getattr(upright, name))
+    ends = upright.position + 1e-3 * upright.normal
+    assert not shapely.contains_xy(body, *ends.T).any()
+    assert upright.position[0] == pytest.approx([0, 0], abs=0.1) and upright.side[0] == 1
+    rear = upright.position[np.flatnonzero(np.diff(upright.side))[0]]
+    assert rear == pytest.approx([3, 0.75], abs=0.1)

@@ -1,0 +1,143 @@
+"""Fields at points and the balance of a box beside direct sums, weighted least squares and integrals by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from alsph import sampling
+from alsph.errors import ConfigError
+from alsph.geometry import Kind, cell_centres, lattice
+
+SPACING = 0.1
+
+
+def cloud(dimensions, seed=0):
+    """Return particles about a spacing apart, and points among them."""
+    rng = np.random.default_rng(seed)
+    position = lattice(*dimensions * [cell_centres(8, SPACING)])
+    return position + 0.2 * SPACING * rng.uniform(-1, 1, position.shape), rng.uniform(0.3, 0.5, (6, dimensions))
+
+
+def nearest(position, point, count):
+    """Return the distances of the nearest particles and who they are."""
+    distance = np.linalg.norm(position - point, axis=1)
+    index = np.argsort(distance)[:count]
+    return distance[index] / SPACING, index
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_means_and_filling_are_sums_of_gaussians_over_the_nearest(dimensions):
+    position, points = cloud(dimensions)
+    values = np.random.default_rng(1).normal(size=len(position))
+    for k, point in enumerate(points):
+        distance, index = nearest(position, point, 8 * dimensions)
+        expected = np.average(values[index], weights=np.exp(-2 * distance**2))
+        assert sampling.average(position, values, points, SPACING)[k] == pytest.approx(expected)
+        normal = np.exp(-0.5 * (distance / 0.7) ** 2) / (np.sqrt(2 * np.pi) * 0.7) ** dimensions
+        assert sampling.fill(position, points, SPACING)[k] == pytest.approx(normal.sum())
+    few, _ = cloud(dimensions)
+    assert sampling.average(few[:3], values[:3], points[:1] * 0, SPACING).shape == (1,)
+
+
+def test_there_is_nothing_a_spacing_and_a_half_away_from_all_particles():
+    position = lattice(cell_centres(5, SPACING), cell_centres(5, SPACING))
+    points = np.array([[0.25, 0.05 - 0.149], [0.25, 0.05 - 0.151]])
+    found = sampling.average(position, 3 + 0 * position[:, 0], points, SPACING)
+    assert found[0] == pytest.approx(3) and np.isnan(found[1])
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_interpolation_is_a_weighted_fit_of_a_parabola(dimensions):
+    position, points = cloud(dimensions)
+    values = np.stack([np.sin(9 * position[:, 0]), position.prod(axis=1)], axis=1)
+    found, gradient = sampling.interpolate(position, values, points, SPACING)
+    for k, point in enumerate(points):
+        distance, index = nearest(position, point, 8 * dimensions)
+        offset = position[index] - point
+        pairs = [offset[:, i] * offset[:, j] for i in range(dimensions) for j in range(i, dimensions)]
+        basis = np.stack([np.ones(len(index)), *offset.T, *pairs], axis=1)
+        root = np.exp(-0.25 * distance**2)[:, None]
+        fit = np.linalg.lstsq(root * basis, root * values[index], rcond=None)[0]
+        assert found[k] == pytest.approx(fit[0], abs=1e-6)
+        assert gradient[k] == pytest.approx(fit[1 : dimensions + 1].T, abs=1e-4)
+
+
+def flow(position, velocity, pressure=0.0, fluid=True):
+    count = len(position)
+    return SimpleNamespace(
+        position=position,
+        velocity=np.broadcast_to(velocity, position.shape),
+        pressure=np.broadcast_to(pressure, count),
+        fluid=np.broadcast_to(fluid, count),
+    )
+
+
+def test_the_late_velocity_is_that_of_the_last_quarter():
+    position, points = cloud(2)
+    still = np.arange(len(position)) % 5 == 0  # solids, which are not looked at
+    run = SimpleNamespace(
+        times=np.array([0.0, 1.0, 2.9, 3.0, 4.0]),
+        spacing=SPACING,
+        snapshot=lambda t: flow(position, np.where(still[:, None], 99, t * position), fluid=~still),
+    )
+    assert sampling.late_velocity(run, points) == pytest.approx(3.5 * points)
+    assert sampling.late_velocity(run, points, 0.3) == pytest.approx(3.3 * points)
+    run.times = np.empty(0)
+    assert np.isnan(sampling.late_velocity(run, points)).all()
+
+
+@pytest.mark.parametrize("outlet", [True, False])
+def test_a_run_begins_with_the_flow_of_another_where_that_has_some(monkeypatch, outlet):
+    monkeypatch.setattr(sampling, "CHUNK", 7)
+    source, _ = cloud(2)
+    solid = np.arange(len(source)) % 4 == 0
+    fields = (
+        np.where(solid[:, None], 99, source @ np.array([[1.0, 2.0], [3.0, 4.0]])),
+        np.where(solid, 99, source.sum(axis=1)),
+    )
+    run = SimpleNamespace(path="other", spacing=SPACING, snapshot=lambda: flow(source, *fields, fluid=~solid))
+    position = np.concatenate([lattice(*2 * [0.2 + cell_centres(4, SPACING)]), [[1.0, 0.4], [5.0, 5.0]]])
+    kind = np.resize([Kind.FLUID, Kind.INLET, Kind.OUTLET, Kind.SOLID], len(position))
+    kind[-2:] = Kind.FLUID
+    state = {"position": position, "velocity": 7 + 0 * position, "pressure": 7 + 0 * position[:, 0], "kind": kind}
+    began = sampling.initial_state(state, run, outlet=outlet)
+    near = np.arange(len(position)) < 16
+    takes = near & np.isin(kind, [Kind.FLUID, *[Kind.OUTLET] * outlet])
+    expected = np.where(takes[:, None], position @ np.array([[1.0, 2.0], [3.0, 4.0]]), 7)
+    assert began["velocity"] == pytest.approx(expected)
+    takes = near & np.isin(kind, [Kind.FLUID, Kind.INLET])
+    assert began["pressure"] == pytest.approx(np.where(takes, position.sum(axis=1), 7))
+    assert (state["velocity"] == 7).all() and (state["pressure"] == 7).all() and began["kind"] is kind
+    if outlet:
+        assert (sampling.initial_state(state, run)["velocity"] == began["velocity"]).all()
+    with pytest.raises(ConfigError, match="initial_run = 'other': it is in 2-D and this case in 3-D"):
+        sampling.initial_state(state | {"position": np.zeros((3, 3))}, run)
+
+
+def test_the_balance_of_a_box_in_three_dimensions():
+    """With u = (x, -y, x²) and p = 5x + 6y + 7z, whose derivatives are (x, y, 2x²) along the flow and (5, 6, 7)."""
+    position = lattice(*3 * [cell_centres(12, SPACING)])
+    x, y, z = position.T
+    velocity, pressure = np.stack([x, -y, x**2], axis=1), 5 * x + 6 * y + 7 * z
+    lower, upper = np.array([0.3, 0.4, 0.3]), np.array([0.7, 0.7, 0.8])
+    surface, momentum = sampling.control_volume(position, velocity, pressure, (lower, upper), SPACING, 3.0, 0.5)
+    volume, squares = 0.4 * 0.3 * 0.5, (0.7**3 - 0.3**3) / 3 * 0.3 * 0.5
+    expected = -volume * np.array([5, 6, 7]) - 3 * np.array([0.5 * volume, 0.55 * volume, 2 * squares])
+    expected[2] += 3 * 0.5 * 2 * volume
+    assert surface == pytest.approx(expected, rel=2e-3)
+    assert momentum == pytest.approx(3 * np.array([0.5 * volume, -0.55 * volume, squares]), rel=5e-3)
+
+
+def test_particles_on_the_sides_of_a_box_count_in_part():
+    position = lattice(cell_centres(12, SPACING), cell_centres(12, SPACING))
+    box = np.array([0.33, 0.41]), np.array([0.78, 0.66])
+    _, momentum = sampling.control_volume(position, 0 * position + (2, 3), 0 * position[:, 0], box, SPACING, 5.0, 0.1)
+    assert momentum == pytest.approx(5 * 0.45 * 0.25 * np.array([2, 3]))
+
+
+def test_faces_of_a_box_in_tiles():
+    faces = list(sampling._faces(np.array([0.0, 1.0]), np.array([0.45, 1.2]), SPACING))
+    assert [(axis, sign) for axis, sign, *_ in faces] == [(0, -1), (0, 1), (1, -1), (1, 1)]
+    assert [area for *_, area in faces] == pytest.approx([0.1, 0.1, 0.09, 0.09])
+    assert faces[1][2] == pytest.approx(np.array([[0.45, 1.05], [0.45, 1.15]]))
+    assert faces[2][2] == pytest.approx(np.array([[0.045 + 0.09 * k, 1.0] for k in range(5)]))
