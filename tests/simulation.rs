@@ -116,6 +116,17 @@ fn a_simulation_goes_as_far_as_it_is_asked_to() {
     assert_eq!(simulation.take_history().len(), 2);
 }
 
+/// One column of particles has crossed either plane after one spacing; masses go on from those of the beginning.
+#[test]
+fn the_mass_that_has_crossed_goes_on() {
+    let (value, particles) = channel();
+    let mut simulation = begun(&value, particles, Clock { mass_in: 2.0, mass_out: 3.0, ..Clock::default() }).expect("valid");
+    simulation.advance_until(1.0 / SIDE as f64, None).expect("stable");
+    let clock = simulation.clock();
+    assert_relative_eq!(clock.mass_in, 2.0 + 1.0 / SIDE as f64, epsilon = 1e-12);
+    assert_relative_eq!(clock.mass_out, 3.0 + 1.0 / SIDE as f64, epsilon = 1e-12);
+}
+
 #[test]
 fn an_inflow_is_prescribed_in_the_order_of_the_ids() {
     let mut simulation = simulation();
