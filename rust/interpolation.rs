@@ -5,7 +5,7 @@ use crate::kernel::Smoothing;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::Settings;
 use crate::with_kernel;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Pressure and velocity at `point` from the fluid around it that is seen from there, exact for linear fields; None where no fluid is
 /// near.
@@ -36,7 +36,8 @@ pub fn interpolate<const D: usize>(
     Some((pressure, velocity))
 }
 
-/// The weight of each particle in `near` in the interpolated value.
+/// The weight of each particle in `near` in the interpolated value: that of the fit of a linear field, whose slope in directions that too
+/// few or collinear particles do not tell of is taken as zero.
 fn shape_functions<const D: usize>(
     near: &[usize],
     radius: f64,
@@ -44,22 +45,22 @@ fn shape_functions<const D: usize>(
     point: &Vector<D>,
     weight: impl Fn(&Vector<D>, f64) -> f64,
 ) -> Option<Vec<f64>> {
-    let basis = |j: usize| {
-        let r = (particles.position[j] - point) / radius;
-        DVector::from_fn(D + 1, |k, _| if k == 0 { 1.0 } else { r[k - 1] })
-    };
-    let weight = |j: usize| weight(&particles.position[j], (particles.position[j] - point).norm());
-    let mut moments = DMatrix::zeros(D + 1, D + 1);
-    for &j in near {
-        let p = basis(j);
-        moments += &p * p.transpose() * weight(j);
-    }
-    let total = moments[(0, 0)];
+    let away = |j: usize| (particles.position[j] - point) / radius;
+    let weights: Vec<f64> = near.iter().map(|&j| weight(&particles.position[j], radius * away(j).norm())).collect();
+    let total: f64 = weights.iter().sum();
     if total <= 0.0 {
         return None;
     }
-    let one = DVector::from_fn(D + 1, |k, _| if k == 0 { 1.0 } else { 0.0 });
-    // Too few or collinear particles leave only the Shepard average.
-    let coefficients = moments.svd(true, true).solve(&one, 1e-6 * total).unwrap_or_else(|_| &one / total);
-    Some(near.iter().map(|&j| coefficients.dot(&basis(j)) * weight(j)).collect())
+    // About the mean of the places, where the fit is the mean of the values whatever its slope.
+    let mean = near.iter().zip(&weights).map(|(&j, w)| away(j) * (w / total)).sum::<Vector<D>>();
+    let mut moments = DMatrix::zeros(D, D);
+    for (&j, w) in near.iter().zip(&weights) {
+        let r = away(j) - mean;
+        moments += r * r.transpose() * *w;
+    }
+    // Not by singular values: nalgebra's are wrong by 4e-4 for some matrices of three dimensions.
+    let SymmetricEigen { eigenvalues, eigenvectors } = moments.symmetric_eigen();
+    let told = eigenvalues.map(|value| if value > 1e-6 * total { 1.0 / value } else { 0.0 });
+    let slope = &eigenvectors * (eigenvectors.transpose() * mean).component_mul(&told);
+    Some(near.iter().zip(&weights).map(|(&j, w)| w * (1.0 / total - (away(j) - mean).dot(&slope))).collect())
 }

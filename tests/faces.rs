@@ -1,6 +1,9 @@
 //! Thin bodies: what the two faces of one show to the fluid on each.
 
+use alsph::boundary::Walls;
+use alsph::shifting::shift;
 use alsph::{Clock, ParticleKind, Particles, Simulation, Vector};
+use common::set::Set;
 use serde_json::json;
 
 mod common;
@@ -108,4 +111,115 @@ fn a_restart_and_threads_change_no_bit_of_a_flow_past_a_thin_plate() {
     };
     let different = bits(&whole).iter().zip(&bits(&resumed)).filter(|(a, b)| a != b).count();
     assert_eq!(different, 0);
+}
+
+/// Part of a place at `height` over the middle of a plate that is on its upper face.
+fn upper(height: f64, thickness: f64) -> f64 {
+    let t = (0.5 + height / thickness).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// The end of a plate of two rows, 2 Δx thick, at [0.5, 0.5], with two particles at each place, and fluid at these cells from its end.
+fn plate_end(fluid: &[[f64; 2]]) -> Set<2> {
+    let (mut points, mut faces) = (Vec::new(), Vec::new());
+    for (column, row, up) in
+        (0..3).flat_map(|column| [-0.5, 0.5].map(|row| [(column, row, 1.0), (column, row, -1.0)])).flatten()
+    {
+        points.push([-f64::from(column), row]);
+        faces.push((up, 1.0 - up * row));
+    }
+    let solids = points.len();
+    points.extend_from_slice(fluid);
+    let mut particles = common::particles(points.into_iter().map(|x| Vector::from(x).add_scalar(5.0) * SPACING).collect());
+    for (i, (up, depth)) in faces.into_iter().enumerate() {
+        (particles.normal[i], particles.depth[i]) = (Vector::from([0.0, up]), depth * SPACING);
+    }
+    particles.kind[..solids].fill(ParticleKind::Solid);
+    Set::of(particles, &common::settings::<2>(SPACING, "none"), false)
+}
+
+#[test]
+fn around_an_edge_the_shares_of_both_faces_change_smoothly() {
+    let fluid = [[0.0, 2.0], [1.0, 0.5], [1.0, 0.0], [1.5, -0.25], [-1.0, -1.5], [2.0, 0.9]];
+    let Set { particles, frame } = plate_end(&fluid);
+    let solids = particles.real - fluid.len();
+    let mut seen = 0;
+    for i in 0..particles.real {
+        let (row, lane) = frame.stencil.neighbours.row(i);
+        for (entry, share) in row
+            .solid_seen(lane)
+            .filter(|(entry, _)| frame.stencil.is_near(&common::settings::<2>(SPACING, "none"), i, entry.j()))
+        {
+            let up = particles.normal[entry.j()][1];
+            let expected = match i.checked_sub(solids) {
+                Some(k) => upper(up * fluid[k][1], 2.0),
+                // Solids see those of their own face.
+                None => f64::from(particles.normal[i][1] == up),
+            };
+            assert!((share - expected).abs() < 1e-6, "{i} sees {share} of {}, {expected} is right", entry.j());
+            seen += 1;
+        }
+        assert!(row.flowing_seen(lane).all(|(entry, share)| entry.j() == i || i < solids || share == 1.0));
+    }
+    assert!(seen > 100);
+}
+
+#[test]
+fn particles_at_one_place_of_which_nothing_else_is_known_share_evenly() {
+    let mut particles = common::particles([[0.5, 0.5], [0.5, 0.5], [0.6, 0.5]].map(Vector::from).to_vec());
+    particles.kind[..2].fill(ParticleKind::Solid);
+    let Set { frame, .. } = Set::of(particles, &common::settings::<2>(SPACING, "none"), false);
+    let (row, lane) = frame.stencil.neighbours.row(2);
+    assert_eq!(row.solid_seen(lane).map(|(_, share)| share).collect::<Vec<_>>(), [0.5, 0.5]);
+}
+
+#[test]
+fn a_plate_hides_what_is_behind_it() {
+    let Set { particles, frame } = plate_end(&[]);
+    let solids: Vec<_> = (0..particles.real).collect();
+    let sight = |a: [f64; 2], b: [f64; 2]| {
+        let place = |x: [f64; 2]| Vector::from(x).add_scalar(5.0) * SPACING;
+        frame.faces.sight(&particles, SPACING, &solids, &place(a), &place(b))
+    };
+    let partly = upper(0.75, 2.0) - upper(-0.5, 2.0);
+    for (a, b, expected) in [
+        // Through the plate, between its particles, and past its end, half a spacing to a whole one away.
+        ([-1.0, 2.0], [-1.0, -2.0], 0.0),
+        ([-0.5, 2.0], [-0.5, -2.0], 0.0),
+        ([0.5, 2.0], [0.5, -2.0], 0.0),
+        ([0.75, 2.0], [0.75, -2.0], 0.5),
+        ([1.0, 2.0], [1.0, -2.0], 1.0),
+        // On one side, however near.
+        ([-2.0, 1.1], [0.0, 3.0], 1.0),
+        // From one part of the edge to another.
+        ([0.0, 0.75], [0.0, -0.5], 1.0 - partly * partly),
+        // Not beyond the two places.
+        ([2.0, 0.5], [1.0, -0.5], 1.0),
+        ([1.0, -0.5], [2.0, 0.5], 1.0),
+    ] {
+        assert!((sight(a, b) - expected).abs() < 1e-9, "{} from {a:?} to {b:?}, {expected} is right", sight(a, b));
+    }
+}
+
+/// Each place of a plate counts once in the shift, whether it has one particle or two.
+#[test]
+fn two_particles_at_a_place_shift_the_fluid_as_one_does() {
+    let [one, two] = [false, true].map(|faces| {
+        let (value, mut particles) = two_streams(2, faces);
+        for i in (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Fluid) {
+            particles.position[i][1] += 0.1 * SPACING * (i as f64).sin();
+            particles.velocity[i] = Vector::from([(3.0 * i as f64).sin(), (2.0 * i as f64).cos()]);
+        }
+        let settings = common::parse(&value);
+        let mut set = Set::of(particles, &settings, false);
+        let (mut walls, before) = (Walls::new(&settings), set.particles.clone());
+        walls.viscous_velocity = vec![Vector::zeros(); before.len()];
+        shift(&settings, &mut set.particles, &set.frame, &walls, 1e-3, 1.0, &mut Vec::new());
+        let fluid = (0..before.real).filter(|&i| before.kind[i] == ParticleKind::Fluid);
+        fluid.map(|i| set.particles.position[i] - before.position[i]).collect::<Vec<_>>()
+    });
+    let longest = one.iter().map(|shift| shift.norm()).fold(0.0, f64::max);
+    assert!(longest > 1e-6);
+    let off = one.iter().zip(&two).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    assert!(off < 1e-6 * longest, "{off:.1e} of {longest:.1e}");
 }

@@ -1,0 +1,131 @@
+//! Which settings are refused, and the lengths, eigenvalues and limits that follow from those that are not.
+
+use alsph::{Settings, Vector};
+use approx::assert_relative_eq;
+use serde_json::{Value, json};
+
+mod common;
+
+/// Settings with the values at these JSON pointers.
+fn with(changes: &[(&str, Value)]) -> Value {
+    let mut value = common::settings_value::<2>(0.05, "slip");
+    value["adaptive_until"] = Value::Null;
+    value["velocity_limit"] = Value::Null;
+    for (pointer, chosen) in changes {
+        *value.pointer_mut(pointer).expect("a setting") = chosen.clone();
+    }
+    value
+}
+
+#[test]
+fn settings_beyond_their_bounds_are_refused_by_name() {
+    let wall = json!({"name": "wall", "velocity": [0.0, 0.0], "moves": false, "center": [0.0, 0.0]});
+    let plane = json!([["slip", "slip"], ["slip", "slip"]]);
+    // The bounds themselves, or what lies next to them within, and what lies beyond.
+    let bounds = [
+        ("/dimensions", "dimensions", vec![], vec![json!(1), json!(4)]),
+        ("/viscous_order", "viscous_order", vec![json!(2), json!(4)], vec![json!(3), json!(0)]),
+        ("/particle_spacing", "particle_spacing", vec![], vec![json!(0.0), json!(-0.05)]),
+        ("/smoothing_ratio", "smoothing_ratio", vec![json!(0.8), json!(3.0)], vec![json!(0.79), json!(3.01), json!(0.0)]),
+        ("/density", "density", vec![json!(1e-9)], vec![json!(0.0), json!(-1.0)]),
+        ("/time_step", "time_step", vec![json!(1e-9)], vec![json!(0.0), json!(-1.0)]),
+        ("/time_step_safety", "time_step_safety", vec![json!(1e-9)], vec![json!(0.0), json!(-1.0)]),
+        ("/divergence_tolerance", "divergence_tolerance", vec![json!(1e-9)], vec![json!(0.0), json!(-1.0)]),
+        ("/shift_limit", "shift_limit", vec![json!(1e-9)], vec![json!(0.0), json!(-1.0)]),
+        ("/velocity_limit", "velocity_limit", vec![json!(1e-9), Value::Null], vec![json!(0.0), json!(-1.0)]),
+        ("/kinematic_viscosity", "kinematic_viscosity", vec![json!(0.0)], vec![json!(-1e-9)]),
+        ("/shift_coefficient", "shift_coefficient", vec![json!(0.0)], vec![json!(-1e-9)]),
+        ("/penalty_constant", "penalty_constant", vec![json!(1.0), json!(100.0)], vec![json!(0.99), json!(100.01)]),
+        ("/max_iterations", "max_iterations", vec![json!(1), json!(1000)], vec![json!(0), json!(1001)]),
+        ("/projection_sweeps", "projection_sweeps", vec![json!(0), json!(1000)], vec![json!(1001)]),
+        ("/body_force", "body_force", vec![json!([1.0, -2.0])], vec![json!([1.0]), json!([1.0, 0.0, 0.0])]),
+        ("/bodies", "bodies", vec![json!([]), json!([wall])], vec![json!([wall, wall])]),
+        ("/bodies/0/velocity", "bodies.wall.velocity", vec![json!([1.0, -2.0])], vec![json!([1.0])]),
+        ("/bodies/0/center", "bodies.wall.center", vec![json!([1.0, -2.0])], vec![json!([1.0])]),
+        ("/domain/lower", "domain", vec![json!([-9.0, 0.7])], vec![json!([0.0]), json!([0.0, 0.9]), json!([2.0, 0.0])]),
+        ("/domain/upper", "domain", vec![json!([0.2, 9.0])], vec![json!([1.0]), json!([0.1, 1.0]), json!([1.0, -2.0])]),
+        ("/domain/boundaries", "domain.boundaries", vec![plane], vec![json!([["slip", "slip"]])]),
+        (
+            "/domain/boundaries/1",
+            "domain.boundaries",
+            vec![json!(["periodic", "periodic"]), json!(["inlet", "none"])],
+            vec![json!(["periodic", "slip"]), json!(["inlet", "periodic"])],
+        ),
+        ("/search_every_iteration", "search_every_iteration", vec![json!(false)], vec![json!(true)]),
+    ];
+    for (pointer, name, good, bad) in bounds {
+        for value in good {
+            let settings = Settings::from_json(&with(&[(pointer, value.clone())]).to_string());
+            assert!(settings.is_ok(), "{pointer} = {value}: {:?}", settings.err());
+        }
+        for value in bad {
+            let refused = Settings::from_json(&with(&[(pointer, value.clone())]).to_string());
+            let error = refused.expect_err(&format!("{pointer} = {value}")).to_string();
+            assert!(error.starts_with(&format!("setting `{name}")), "{pointer} = {value}: {error}");
+        }
+    }
+    let original = with(&[("/derivative_frame", "updated".into()), ("/search_every_iteration", true.into())]);
+    assert!(Settings::from_json(&original.to_string()).is_ok());
+}
+
+#[test]
+fn lengths_follow_from_the_spacing() {
+    let settings = common::settings::<2>(0.05, "none");
+    assert_relative_eq!(settings.smoothing_length(), 0.2 / 3.0, max_relative = 1e-15);
+    assert_relative_eq!(settings.support_radius(), 0.2, max_relative = 1e-15);
+    // More than the support radius by a hair, so that a lattice's particles at that distance count.
+    assert!((1e-8..1e-6).contains(&(settings.neighbour_distance() / 0.2 - 1.0)));
+    let buffer = |ratio: f64| common::parse(&with(&[("/smoothing_ratio", ratio.into())])).buffer_length();
+    for (ratio, spacings) in [(1.0, 6.0), (1.1, 7.0), (4.0 / 3.0, 8.0), (1.35, 9.0)] {
+        assert_relative_eq!(buffer(ratio), spacings * 0.05, max_relative = 1e-12);
+    }
+    let (lower, upper) = settings.bounds();
+    assert_relative_eq!(lower, Vector::from([-1.2, -1.2]), max_relative = 1e-12);
+    assert_relative_eq!(upper, Vector::from([2.2, 2.2]), max_relative = 1e-12);
+}
+
+#[test]
+fn the_time_step_is_limited_by_penalty_friction_and_body_force() {
+    let limits = |rule: &str| {
+        let changes = [("/wall_velocity", rule.into()), ("/body_force", json!([0.3, -0.4]))];
+        common::parse(&with(&changes)).time_step_limits(2.0, 8.0)
+    };
+    let (h, adami, cubic) = (0.2f64 / 3.0, limits("adami"), limits("cubic"));
+    // r_AL Δt λ/Δx² = 2 with r_AL = C u² Δt.
+    assert_relative_eq!(adami.penalty, (2.0f64 / 8.0 / 100.0).sqrt() * 0.05 / 2.0, max_relative = 1e-12);
+    assert_relative_eq!(adami.viscous, 0.125 * h * h / 0.01, max_relative = 1e-12);
+    assert_relative_eq!(cubic.viscous, 0.0625 * h * h / 0.01, max_relative = 1e-12);
+    assert_relative_eq!(adami.body_force, 0.25 * (h / 0.5).sqrt(), max_relative = 1e-12);
+    let still = common::settings::<2>(0.05, "none").time_step_limits(0.0, 8.0);
+    assert!(still.penalty == f64::INFINITY && still.body_force == f64::INFINITY);
+}
+
+/// Largest eigenvalues of Laplacian and of the divergence of the gradient, and c of the error of the Laplacian of a long wave, from
+/// a separate program over a set of wave vectors four times as fine.
+#[test]
+fn eigenvalues_and_dispersion_are_those_of_plain_sums() {
+    for (dimensions, kernel, ratio, laplacian, projection, dispersion) in [
+        (2, "quintic_spline", 4.0 / 3.0, 2.17486, 0.42105, 0.21472),
+        (3, "quintic_spline", 4.0 / 3.0, 2.25087, 0.43609, 0.20720),
+        (3, "quintic_spline", 1.0, 4.00042, 0.77426, 0.11668),
+        (2, "wendland_c2", 1.6, 2.58304, 0.50345, 0.17796),
+        (3, "wendland_c2", 1.6, 2.69485, 0.52537, 0.17193),
+    ] {
+        let mut value = if dimensions == 2 {
+            common::settings_value::<2>(0.05, "none")
+        } else {
+            common::settings_value::<3>(0.05, "none")
+        };
+        (value["kernel"], value["smoothing_ratio"]) = (kernel.into(), ratio.into());
+        let settings = common::parse(&value);
+        assert_relative_eq!(settings.largest_laplacian_eigenvalue(), laplacian, max_relative = 2e-3);
+        assert_relative_eq!(settings.largest_projection_eigenvalue(), projection, max_relative = 0.02);
+        assert_relative_eq!(settings.laplacian_dispersion(), dispersion, max_relative = 2e-3);
+    }
+}
+
+#[test]
+fn only_the_frame_in_the_middle_lies_ahead() {
+    let fraction = |frame: &str| common::parse(&with(&[("/derivative_frame", frame.into())])).derivative_frame.fraction();
+    assert_eq!(["initial", "updated", "midpoint"].map(fraction), [0.0, 0.0, 0.5]);
+}

@@ -1,0 +1,71 @@
+//! How far particles are displaced: the two velocity scales of (18), and its limit.
+
+use alsph::boundary::Walls;
+use alsph::settings::Shifting;
+use alsph::shifting::shift;
+use alsph::{Settings, Vector};
+use approx::assert_relative_eq;
+use common::set::Set;
+
+mod common;
+
+const SIDE: usize = 14;
+const VELOCITY_MAX: f64 = 1.7;
+
+/// The shift of each particle of a disordered box, and of one that is alone.
+fn shifts(settings: &Settings, time_step: f64) -> (Set<2>, Vec<Vector<2>>) {
+    let mut points = common::lattice::<2>(SIDE, 0.3);
+    points.push(Vector::from([9.0, 9.0]));
+    let mut set = Set::of(common::particles(points), settings, false);
+    for i in 0..set.particles.real {
+        set.particles.velocity[i] = Vector::from([(3.0 * i as f64).sin(), (2.0 * i as f64).cos()]);
+    }
+    let mut after = set.particles.clone();
+    shift(settings, &mut after, &set.frame, &Walls::new(settings), time_step, VELOCITY_MAX, &mut Vec::new());
+    let shifts = (0..after.real).map(|i| after.position[i] - set.particles.position[i]).collect();
+    (set, shifts)
+}
+
+#[test]
+fn the_older_form_goes_with_the_largest_velocity() {
+    let mut settings = common::settings::<2>(1.0 / SIDE as f64, "none");
+    settings.shifting = Shifting::MaximumVelocity;
+    let time_step = 1e-4;
+    let (set, shifts) = shifts(&settings, time_step);
+    for i in 0..SIDE * SIDE {
+        let (mut asymmetry, mut distances, mut count) = (Vector::<2>::zeros(), 0.0, 0.0);
+        for j in (0..SIDE * SIDE).filter(|&j| j != i) {
+            let r_ij = set.particles.position[i] - set.particles.position[j];
+            if r_ij.norm() < settings.support_radius() {
+                asymmetry += r_ij / r_ij.norm().powi(3);
+                (distances, count) = (distances + r_ij.norm(), count + 1.0);
+            }
+        }
+        let mean: f64 = distances / count;
+        let expected = asymmetry * (mean * mean * settings.shift_coefficient * VELOCITY_MAX * time_step);
+        assert_relative_eq!(shifts[i], expected, epsilon = 1e-5 * expected.norm());
+    }
+    assert_eq!(shifts[SIDE * SIDE], Vector::<2>::zeros());
+}
+
+#[test]
+fn no_shift_is_longer_than_its_limit() {
+    for shifting in [Shifting::Xsph, Shifting::MaximumVelocity] {
+        let mut settings = common::settings::<2>(1.0 / SIDE as f64, "none");
+        settings.shifting = shifting;
+        let limit = settings.shift_limit / SIDE as f64;
+        let (_, free) = shifts(&settings, 1e-4);
+        let (_, limited) = shifts(&settings, 1.0);
+        let mut ends = 0;
+        for (free, limited) in free.iter().zip(&limited) {
+            let long = free * 1e4;
+            let expected = if long.norm() > limit { long * (limit / long.norm()) } else { long };
+            assert_relative_eq!(*limited, expected, epsilon = 1e-9 * limit);
+            ends += usize::from(long.norm() > limit);
+        }
+        assert!(ends > SIDE * SIDE / 2);
+    }
+    let mut settings = common::settings::<2>(1.0 / SIDE as f64, "none");
+    settings.shifting = Shifting::None;
+    assert!(shifts(&settings, 1.0).1.iter().all(|shift| *shift == Vector::<2>::zeros()));
+}

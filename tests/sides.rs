@@ -1,0 +1,188 @@
+//! What happens at the sides of the domain, and the images beyond them.
+
+use alsph::boundary::{Images, deep_in_inlet, end_step};
+use alsph::neighbours::Grid;
+use alsph::{ParticleKind, Particles, Vector};
+use approx::assert_relative_eq;
+use serde_json::{Value, json};
+
+mod common;
+
+const SPACING: f64 = 0.1;
+
+fn box_between(boundaries: Value) -> Value {
+    let mut value = common::settings_value::<2>(SPACING, "none");
+    (value["density"], value["domain"]) =
+        (1.7.into(), json!({"lower": [-1.0, 0.5], "upper": [1.0, 2.0], "boundaries": boundaries}));
+    value
+}
+
+/// Fluid at `points` with a velocity, and a solid particle at each of them too.
+fn doubled(points: &[[f64; 2]]) -> Particles<2> {
+    let mut particles = common::particles([points, points].concat().into_iter().map(Vector::from).collect());
+    particles.velocity.fill(Vector::from([3.0, -2.0]));
+    particles.kind[points.len()..].fill(ParticleKind::Solid);
+    particles
+}
+
+fn ended(value: &Value, particles: &mut Particles<2>) {
+    end_step(particles, &common::parse(value), &Grid::default(), &mut 1000);
+}
+
+#[test]
+fn slip_walls_throw_fluid_back() {
+    let points = [[-1.02, 1.0], [1.03, 1.0], [0.0, 0.49], [0.0, 2.01], [1.01, 2.02], [1.0, 1.0], [-1.0, 0.5], [0.3, 1.0]];
+    let back = [[-0.98, 1.0], [0.97, 1.0], [0.0, 0.51], [0.0, 1.99], [0.99, 1.98], [1.0, 1.0], [-1.0, 0.5], [0.3, 1.0]];
+    let turned = [[-3.0, -2.0], [-3.0, -2.0], [3.0, 2.0], [3.0, 2.0], [-3.0, 2.0], [3.0, -2.0], [3.0, -2.0], [3.0, -2.0]];
+    let mut particles = doubled(&points);
+    ended(&box_between(json!([["slip", "slip"], ["slip", "slip"]])), &mut particles);
+    for i in 0..points.len() {
+        assert_relative_eq!(particles.position[i], Vector::from(back[i]), epsilon = 1e-12);
+        assert_eq!(particles.velocity[i], Vector::from(turned[i]));
+        // Bodies go through.
+        assert_eq!(particles.position[points.len() + i], Vector::from(points[i]));
+        assert_eq!(particles.velocity[points.len() + i], Vector::from([3.0, -2.0]));
+    }
+}
+
+#[test]
+fn what_leaves_through_a_periodic_side_comes_in_at_the_other() {
+    let points = [[-1.02, 1.0], [1.03, 1.0], [0.0, 0.49], [0.0, 2.01], [1.0, 1.0], [-1.0, 0.5], [0.3, 2.0]];
+    let back = [[0.98, 1.0], [-0.97, 1.0], [0.0, 1.99], [0.0, 0.51], [-1.0, 1.0], [-1.0, 0.5], [0.3, 0.5]];
+    let mut particles = doubled(&points);
+    ended(&box_between(json!([["periodic", "periodic"], ["periodic", "periodic"]])), &mut particles);
+    for i in 0..particles.real {
+        assert_relative_eq!(particles.position[i], Vector::from(back[i % points.len()]), epsilon = 1e-12);
+        assert_eq!(particles.velocity[i], Vector::from([3.0, -2.0]));
+    }
+}
+
+#[test]
+fn fluid_that_crosses_an_outlet_has_no_pressure_and_counts_as_mass() {
+    let settings = common::parse(&box_between(json!([["inlet", "outlet"], ["slip", "slip"]])));
+    // Two leave, one comes back, one stays in the buffer, one is within; two enter.
+    let cells = [[1.01, 1.0], [1.02, 1.2], [0.99, 1.4], [1.3, 1.0], [0.5, 1.0], [-0.99, 1.0], [-0.98, 1.5], [-1.2, 1.0]];
+    let mut particles = common::particles(cells.map(Vector::from).to_vec());
+    particles.kind[2..4].fill(ParticleKind::Outlet);
+    particles.kind[5..].fill(ParticleKind::Inlet);
+    (0..8).for_each(|i| particles.pressure[i] = 1.0 + i as f64);
+    let mut next_id = 100;
+    let flow = end_step(&mut particles, &settings, &Grid::default(), &mut next_id);
+    let mass = 1.7 * SPACING * SPACING;
+    assert_relative_eq!(flow.outflow, mass, epsilon = 1e-12);
+    assert_relative_eq!(flow.inflow, 2.0 * mass, epsilon = 1e-12);
+    // Those that follow have the pressure of the one that they follow, where no other is known.
+    assert_eq!(particles.pressure, [0.0, 0.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 6.0, 7.0]);
+    assert_eq!((&particles.id[8..], next_id, particles.real), (&[100, 101][..], 102, 10));
+    // Without an outlet nothing leaves through it.
+    let closed = common::parse(&box_between(json!([["inlet", "none"], ["slip", "slip"]])));
+    let mut particles = common::particles(vec![Vector::from([1.01, 1.0])]);
+    assert_eq!(end_step(&mut particles, &closed, &Grid::default(), &mut 1).outflow, 0.0);
+    assert_eq!(particles.kind, [ParticleKind::Fluid]);
+}
+
+/// Of the particles around, the nearest inlet particle counts, not fluid, and no image.
+#[test]
+fn a_refilled_particle_has_the_pressure_of_the_nearest_inlet_particle() {
+    let settings = common::parse(&box_between(json!([["inlet", "outlet"], ["none", "none"]])));
+    let far = -0.99 - settings.buffer_length();
+    let cells = [[-0.99, 1.0], [far + 0.08, 1.0], [far + 0.05, 1.05], [far, 1.01], [far, 0.91], [far + 0.01, 1.0]];
+    let mut particles = common::particles(cells.map(Vector::from).to_vec());
+    particles.kind.fill(ParticleKind::Inlet);
+    particles.kind[3] = ParticleKind::Fluid;
+    (0..6).for_each(|i| particles.pressure[i] = i as f64);
+    let mut grid = Grid::default();
+    grid.build(&particles.position, settings.support_radius(), settings.bounds());
+    // The last was an image, and is gone.
+    particles.real = 5;
+    particles.drop_images();
+    end_step(&mut particles, &settings, &grid, &mut 100);
+    assert_relative_eq!(particles.position[5], Vector::from([far, 1.0]), epsilon = 1e-12);
+    assert_eq!(particles.pressure[5], 2.0);
+}
+
+#[test]
+fn deep_in_an_inlet_is_a_support_radius_beyond_its_plane() {
+    let settings = common::parse(&box_between(json!([["inlet", "outlet"], ["inlet", "none"]])));
+    let (deep, radius) = (deep_in_inlet(&settings), settings.support_radius());
+    let inlet = |x: f64, y: f64| deep(ParticleKind::Inlet, &Vector::from([x, y]));
+    assert!(inlet(-1.0 - 1.01 * radius, 1.0) && !inlet(-1.0 - 0.99 * radius, 1.0) && !inlet(0.0, 1.0));
+    assert!(inlet(0.0, 0.5 - 1.01 * radius) && !inlet(0.0, 0.5 - 0.99 * radius));
+    assert!(!deep(ParticleKind::Fluid, &Vector::from([-9.0, 1.0])) && !inlet(9.0, 1.0));
+    let closed = common::parse(&box_between(json!([["none", "outlet"], ["slip", "slip"]])));
+    assert!(!deep_in_inlet(&closed)(ParticleKind::Inlet, &Vector::from([-9.0, 1.0])));
+}
+
+/// Images beyond periodic sides in x and slip walls in y.
+fn images_of(points: &[[f64; 2]]) -> (Images<2>, Particles<2>) {
+    let settings = common::parse(&box_between(json!([["periodic", "periodic"], ["slip", "slip"]])));
+    let mut particles = common::particles(points.iter().copied().map(Vector::from).collect());
+    particles.velocity.fill(Vector::from([3.0, -2.0]));
+    particles.normal.fill(Vector::from([0.6, 0.8]));
+    (0..points.len()).for_each(|i| particles.pressure[i] = i as f64);
+    let mut images = Images::default();
+    images.create(&mut particles, &settings.domain, 0.25);
+    (images, particles)
+}
+
+#[test]
+fn images_lie_within_reach_of_the_sides() {
+    // In a corner, on the planes, at reach and just within, and far from all sides.
+    let points = [[-0.9, 0.6], [1.0, 1.0], [0.0, 0.5], [0.76, 1.0], [0.75, 1.0], [0.0, 1.76], [0.0, 1.75], [0.0, 1.0]];
+    let (images, particles) = images_of(&points);
+    assert_eq!(particles.real, points.len());
+    let expected = [
+        (0, [1.1, 0.6], 1.0),
+        (1, [-1.0, 1.0], 1.0),
+        (3, [-1.24, 1.0], 1.0),
+        (0, [-0.9, 0.4], -1.0),
+        (5, [0.0, 2.24], -1.0),
+        (0, [1.1, 0.4], -1.0),
+    ];
+    assert_eq!(particles.len() - particles.real, expected.len());
+    for (k, (source, place, turned)) in expected.into_iter().enumerate() {
+        let i = particles.real + k;
+        assert_relative_eq!(particles.position[i], Vector::from(place), epsilon = 1e-12);
+        assert_eq!(particles.velocity[i], Vector::from([3.0, -2.0 * turned]));
+        assert_eq!(particles.normal[i], Vector::from([0.6, 0.8 * turned]));
+        assert_eq!((particles.pressure[i], particles.id[i]), (source as f64, source as u64));
+    }
+    let (mut position, mut velocity, mut pressure) =
+        (particles.position.clone(), particles.velocity.clone(), particles.pressure.clone());
+    position[0] += Vector::from([0.01, 0.02]);
+    (velocity[0], pressure[0]) = (Vector::from([5.0, 7.0]), 9.0);
+    images.positions(&mut position);
+    images.vectors(&mut velocity);
+    images.scalars(&mut pressure);
+    let corner = particles.len() - 1;
+    assert_relative_eq!(position[corner], Vector::from([1.11, 0.38]), epsilon = 1e-12);
+    assert_eq!((velocity[corner], pressure[corner]), (Vector::from([5.0, -7.0]), 9.0));
+}
+
+#[test]
+fn what_is_stale_is_made_nan_and_what_looks_fresh_is_found() {
+    let (mut images, particles) = images_of(&[[-0.9, 1.0], [0.0, 1.0]]);
+    let mut field = particles.pressure.clone();
+    images.real(&mut field)[0] = 4.0;
+    assert!(field[..2] == [4.0, 1.0] && field[2].is_nan());
+    images.check(&field, |_, value| value);
+    images.scalars(&mut field);
+    images.check(&field, |_, value| value);
+    images.check(&[], |_, value: f64| value);
+    images.blank(&mut field, 3);
+    assert!(field.iter().all(|value| value.is_nan()));
+    // Without poison what was there stays, and nothing is checked.
+    images.poisons = false;
+    let mut field = vec![1.0, 2.0, 3.0];
+    images.real(&mut field)[0] = 4.0;
+    images.blank(&mut field, 3);
+    assert_eq!(field, [4.0, 2.0, 3.0]);
+    images.check(&field, |_, value| value);
+    images.poisons = true;
+    // The panic is wanted.
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(|_| ()));
+    let found = std::panic::catch_unwind(|| images.check(&field, |_, value| value));
+    std::panic::set_hook(hook);
+    assert!(found.is_err());
+}
