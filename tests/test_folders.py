@@ -116,6 +116,12 @@ def test_a_run_killed_before_its_first_step_is_to_be_run_again(path):
     assert Run(path).status == "stopped" and "alsph run, with --force" in Run(path).info["message"]
 
 
+def _in_terminal():
+    """Make what the input is the session's terminal, whose end a test under nohup would not hear of either."""
+    os.close(os.open(os.ttyname(0), os.O_RDWR))
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 def test_a_terminal_that_closes_costs_no_step(tmp_path, small):
     """The system sends SIGHUP to the terminal's session, and all that the run says from then on fails."""
     path, file = tmp_path / "run", write_case(tmp_path / "case.toml", small, until=60.0)
@@ -126,7 +132,7 @@ def test_a_terminal_that_closes_costs_no_step(tmp_path, small):
         stdout=terminal,
         stderr=terminal,
         start_new_session=True,
-        preexec_fn=lambda: os.close(os.open(os.ttyname(0), os.O_RDWR)),  # which makes it the session's terminal
+        preexec_fn=_in_terminal,
     )
     os.close(terminal)
     wait_until_stepping(path, process)
