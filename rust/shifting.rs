@@ -137,7 +137,8 @@ struct Surroundings<V, const D: usize> {
 }
 
 impl<K: Kernel, const D: usize, const SHARED: bool> Displacement<'_, K, D, SHARED> {
-    /// At r^{n+1}, over the neighbours in the frame of the last derivatives. The distances in double precision: the rounding of single would break the symmetry of a symmetric flow within a few steps.
+    /// At r^{n+1}, over the neighbours in the frame of the last derivatives. The distances in double precision: the rounding of
+    /// single would break the symmetry of a symmetric flow within a few steps.
     #[inline(always)]
     fn surroundings<V: Lanes>(&self, cluster: Cluster, row: Row<'_>) -> Surroundings<V, D> {
         let in_frame = &self.stencil.position;

@@ -14,7 +14,6 @@ from shapely import affinity
 MARGINS = (0.3, 0.4, 0.5, 0.6)
 """Distances [D] of the boxes' faces from the body."""
 
-
 CHANNEL = {"length": 5.0, "height": 4.0, "upstream": 2.0, "perturbation": 0.0}
 
 
