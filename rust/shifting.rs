@@ -59,10 +59,6 @@ pub type Change<const D: usize> = (Vector<D>, Vector<D>, f64);
 
 impl<const D: usize> Poison for Change<D> {
     const POISON: Self = (Poison::POISON, Poison::POISON, Poison::POISON);
-
-    fn is_poison(&self) -> bool {
-        self.0.is_poison() || self.1.is_poison() || self.2.is_poison()
-    }
 }
 
 /// Displacement of every particle if it were fluid.

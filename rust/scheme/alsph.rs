@@ -54,10 +54,6 @@ pub struct Derived<const D: usize> {
 
 impl<const D: usize> Poison for Derived<D> {
     const POISON: Self = Self { laplacian: Poison::POISON, solenoidal: Poison::POISON };
-
-    fn is_poison(&self) -> bool {
-        self.laplacian.is_poison() || self.solenoidal.is_poison()
-    }
 }
 
 /// What stays the same during one step.
