@@ -3,6 +3,7 @@
 use alsph::boundary::{Walls, surface_area};
 use alsph::loads::{Load, loads};
 use alsph::operators::LaplacianAndGradient;
+use alsph::settings::WallVelocity;
 use alsph::{ParticleKind, Vector};
 use approx::assert_relative_eq;
 use common::set::Set;
@@ -91,6 +92,57 @@ fn solids_show_the_cubic_of_the_fluid_above() {
     // There is no pressure, and what the pairs exchange beyond the friction is small.
     check(&load);
     assert!(load.pressure_force.norm() < 0.15 * friction, "{}", load.pressure_force);
+}
+
+/// By the rule of Morris, Fox and Zhu a solid shows each fluid particle the line through that particle and the surface, but not beyond
+/// half of what the particle has; and other solids its own velocity.
+#[test]
+fn morris_shows_the_line_through_each_particle_and_the_surface() {
+    let mut settings = common::settings::<2>(0.1, "none");
+    settings.wall_velocity = WallVelocity::Morris;
+    let (wall, slope, normal) = (Vector::from([0.3, -0.1]), Vector::from([2.0, 0.5]), Vector::from([0.6, 0.8]));
+    let along = Vector::from([0.8, -0.6]);
+    for (depth, height, shown) in [(0.1, 0.25, -0.1), (0.1, 0.2, -0.1), (0.1, 0.15, -0.075), (0.15, 0.02, -0.01)] {
+        let mut particles = common::particles(vec![-normal * depth, along * 0.1 + normal * height, along * 0.2]);
+        for solid in [0, 2] {
+            particles.kind[solid] = ParticleKind::Solid;
+            (particles.velocity[solid], particles.normal[solid]) = (wall, normal);
+        }
+        (particles.depth[0], particles.velocity[1]) = (depth, wall + slope * height);
+        let walls = Walls::new(&settings);
+        assert_relative_eq!(walls.seen_by(&particles, 0, 1), wall + slope * shown, epsilon = 1e-12);
+        assert_eq!(walls.seen_by(&particles, 0, 2), wall);
+    }
+}
+
+/// What makes the viscous term of fourth order goes on into the solids as a line, and deep in them there is none.
+#[test]
+fn solids_show_the_line_of_the_fluids_laplacian() {
+    let settings = common::settings::<2>(1.0 / 30.0, "none");
+    let height = |x: &Vector<2>| x[1] - 0.5;
+    let line = |height: f64| Vector::from([1.0 + 3.0 * height, -2.0 * height]);
+    let mut particles = common::particles(common::lattice::<2>(30, 0.2));
+    for i in 0..particles.real {
+        let height = height(&particles.position[i]);
+        if height < 0.0 {
+            (particles.kind[i], particles.normal[i], particles.depth[i]) = (ParticleKind::Solid, Vector::y(), -height);
+        }
+    }
+    let Set { particles, frame } = Set::of(particles, &settings, true);
+    let mut walls = Walls::new(&settings);
+    walls.sharpen(&settings, &particles, &frame, |i| line(height(&particles.position[i])) * 2.0, 0.5);
+    let inside = |x: &Vector<2>| (x[0] - 0.5).abs() < 0.5 - settings.support_radius();
+    let mut solids = 0;
+    for (i, x) in particles.position.iter().enumerate().filter(|(_, x)| inside(x)) {
+        if height(x) > -1.0 / 30.0 {
+            assert_relative_eq!(walls.dispersion[i], line(height(x)), epsilon = 1e-3);
+            solids += usize::from(height(x) < 0.0);
+        }
+        if height(x) < -1.5 * settings.support_radius() {
+            assert_eq!(walls.dispersion[i], Vector::<2>::zeros());
+        }
+    }
+    assert!(solids > 15);
 }
 
 /// The solids of a cylinder stand for its surface, whatever the fluid does and however many layers there are.
