@@ -94,6 +94,31 @@ fn solids_show_the_cubic_of_the_fluid_above() {
     assert!(load.pressure_force.norm() < 0.15 * friction, "{}", load.pressure_force);
 }
 
+/// A single layer of fluid tells no more than the line through it and the surface.
+#[test]
+fn over_a_single_layer_the_profile_is_a_line() {
+    let spacing = 0.05;
+    let mut value = common::settings_value::<2>(spacing, "periodic");
+    value["wall_velocity"] = "cubic".into();
+    let settings = common::parse(&value);
+    let [wall, fluid] = [Vector::from([0.2, 0.1]), Vector::from([1.0, -0.3])];
+    let cells = (0..100).map(|k| Vector::from([(k % 20) as f64, (k / 20) as f64]).add_scalar(0.5) * spacing);
+    let mut particles = common::particles(cells.collect());
+    particles.velocity[80..].fill(wall + fluid);
+    for i in 0..80 {
+        (particles.kind[i], particles.velocity[i], particles.normal[i]) = (ParticleKind::Solid, wall, Vector::y());
+        particles.depth[i] = 4.0 * spacing - particles.position[i][1];
+    }
+    let Set { particles, frame } = Set::of(particles, &settings, false);
+    let mut walls = Walls::new(&settings);
+    walls.see(&settings, &particles, &frame);
+    let slope = fluid / (0.5 * spacing);
+    for i in 40..80 {
+        assert_relative_eq!(walls.slope[i].expect("there is fluid above"), slope, max_relative = 1e-3);
+        assert_relative_eq!(walls.viscous_velocity[i], wall - slope * particles.depth[i], epsilon = 1e-3);
+    }
+}
+
 /// By the rule of Morris, Fox and Zhu a solid shows each fluid particle the line through that particle and the surface, but not beyond
 /// half of what the particle has; and other solids its own velocity.
 #[test]
