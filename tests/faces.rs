@@ -201,9 +201,10 @@ fn a_plate_hides_what_is_behind_it() {
     }
 }
 
-/// Each place of a plate counts once in the shift, whether it has one particle or two.
+/// Each place of a plate counts once in the volumes of the fluid and in its shift, whether it has one particle or two, and what is behind
+/// the plate counts.
 #[test]
-fn two_particles_at_a_place_shift_the_fluid_as_one_does() {
+fn two_particles_at_a_place_take_room_and_shift_the_fluid_as_one_does() {
     let [one, two] = [false, true].map(|faces| {
         let (value, mut particles) = two_streams(2, faces);
         for i in (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Fluid) {
@@ -216,10 +217,13 @@ fn two_particles_at_a_place_shift_the_fluid_as_one_does() {
         walls.viscous_velocity = vec![Vector::zeros(); before.len()];
         shift(&settings, &mut set.particles, &set.frame, &walls, 1e-3, 1.0, &mut Vec::new());
         let fluid = (0..before.real).filter(|&i| before.kind[i] == ParticleKind::Fluid);
-        fluid.map(|i| set.particles.position[i] - before.position[i]).collect::<Vec<_>>()
+        fluid.map(|i| (set.frame.stencil.volume[i], set.particles.position[i] - before.position[i])).collect::<Vec<_>>()
     });
-    let longest = one.iter().map(|shift| shift.norm()).fold(0.0, f64::max);
+    for ((volume, _), (of_two, _)) in one.iter().zip(&two) {
+        assert!((volume / of_two - 1.0).abs() < 1e-5, "{volume} and {of_two}");
+    }
+    let longest = one.iter().map(|(_, shift)| shift.norm()).fold(0.0, f64::max);
     assert!(longest > 1e-6);
-    let off = one.iter().zip(&two).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    let off = one.iter().zip(&two).map(|((_, a), (_, b))| (a - b).norm()).fold(0.0, f64::max);
     assert!(off < 1e-6 * longest, "{off:.1e} of {longest:.1e}");
 }

@@ -149,6 +149,26 @@ fn a_list_is_renewed_when_anything_strays_far() {
     check_moved(common::lattice::<2>(12, 0.3), "none", 0.05, 2.0).expect("the list is complete");
 }
 
+/// Pairs that come at each other at the largest speed, and then by nearly all of the skin, become neighbours from the farthest there is.
+#[test]
+fn what_comes_head_on_at_full_speed_is_found() {
+    let mut value = common::settings_value::<2>(0.1, "none");
+    value["derivative_frame"] = "updated".into();
+    let settings = common::parse(&value);
+    let (speed, beyond, radius) = (0.05, 0.0024, settings.support_radius());
+    let first = common::lattice::<2>(15, 0.5).into_iter().map(|x| Vector::from([0.5 * x[0], x[1]]));
+    let apart = Vector::from([radius + 2.0 * speed + 1.6 * beyond, 0.0]);
+    let mut particles = common::particles(first.flat_map(|x| [x, x + apart]).collect());
+    particles.velocity.iter_mut().enumerate().for_each(|(i, u)| u[0] = if i % 2 == 0 { speed } else { -speed });
+    let mut frame = Frame::default();
+    frame.search(&settings, &mut particles, Travel { time_step: 1.0, velocity_max: speed, fraction: 0.0 }, true);
+    for i in 0..particles.real {
+        particles.position[i][0] += particles.velocity[i][0] * (1.0 + beyond / speed);
+    }
+    frame.update(&settings, &particles);
+    assert_eq!(listed(&frame, &particles, radius), brute_force_neighbours(&particles.position, particles.real, radius));
+}
+
 #[test]
 fn far_strays_cost_no_memory() {
     let mut points: Vec<Vector<2>> = (0..100).map(|i| Vector::from([0.01 * i as f64, 0.0])).collect();

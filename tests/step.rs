@@ -227,7 +227,8 @@ fn with_buffers(particles: &mut Particles<2>) {
     particles.real = particles.len();
 }
 
-/// Without viscosity a step changes the velocity by the gradient of the acting pressure, with sweeps and without.
+/// Without viscosity a step changes the velocity by the gradient of the acting pressure, with sweeps and without, and says what
+/// divergence it leaves.
 #[test]
 fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
     for sweeps in [0, 3] {
@@ -243,7 +244,7 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
         // A second step in the same frame has nothing of the first.
         for _ in 0..2 {
             let before = particles.velocity.clone();
-            scheme.iterate(step, &mut particles, &mut frame, &mut Walls::new(&settings));
+            let outcome = scheme.iterate(step, &mut particles, &mut frame, &mut Walls::new(&settings));
             let acting: Vec<_> = (0..particles.len()).map(|i| scheme.acting_pressure(step, &particles, i)).collect();
             let seen = acting.iter().zip(&particles.pressure).any(|(acting, p)| (acting - p).abs() > 1e-3);
             assert!(seen, "nothing to be seen");
@@ -252,8 +253,31 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
                 let change = (set.particles.velocity[i] - before[i]) * (settings.density / TIME_STEP);
                 assert_relative_eq!(change, -gradient, epsilon = 1e-9);
             }
+            let divergence = set.apply(Divergence(&set.particles.velocity)).into_iter().map(f64::abs);
+            assert_relative_eq!(outcome.divergence_max, divergence.clone().fold(0.0, f64::max), epsilon = 1e-12);
+            assert_relative_eq!(outcome.divergence_sum, divergence.sum::<f64>(), max_relative = 1e-9);
             Set { particles, frame } = set;
         }
+    }
+}
+
+/// Fluid at rest under an even pressure acts with that alone.
+#[test]
+fn at_rest_the_pressure_acts_as_it_is() {
+    let mut value = settings("midpoint");
+    value["body_force"] = json!([0.0, 0.0]);
+    let settings = common::parse(&value);
+    let mut start = box_of_fluid();
+    start.velocity.fill(Vector::zeros());
+    start.pressure.fill(2.5);
+    let Set { mut particles, mut frame } = first_frame(&settings, start);
+    let (penalty, relaxation) = (0.05, relaxation(&settings));
+    let step = Step { settings: &settings, time_step: TIME_STEP, penalty, relaxation, dispersion: 0.0 };
+    let mut scheme = Alsph::default();
+    scheme.iterate(step, &mut particles, &mut frame, &mut Walls::new(&settings));
+    for i in 0..particles.real {
+        assert_eq!(particles.velocity[i], Vector::<2>::zeros());
+        assert_eq!([particles.pressure[i], scheme.acting_pressure(step, &particles, i)], [2.5; 2]);
     }
 }
 
