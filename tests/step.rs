@@ -266,6 +266,8 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
 fn at_rest_the_pressure_acts_as_it_is() {
     let mut value = settings("midpoint");
     value["body_force"] = json!([0.0, 0.0]);
+    // The sweeps come with the last iteration that may be.
+    value["max_iterations"] = json!(1);
     let settings = common::parse(&value);
     let mut start = box_of_fluid();
     start.velocity.fill(Vector::zeros());
