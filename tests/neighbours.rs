@@ -149,6 +149,23 @@ fn a_list_is_renewed_when_anything_strays_far() {
     check_moved(common::lattice::<2>(12, 0.3), "none", 0.05, 2.0).expect("the list is complete");
 }
 
+/// A unit of length 2^10 times as short gives the same neighbours, and volumes 2^20 times as large.
+#[test]
+fn the_unit_of_length_does_not_matter() {
+    let [plain, scaled] = [1.0, 1024.0].map(|unit| {
+        let mut value = common::settings_value::<2>(0.1 * unit, "periodic");
+        value["domain"]["upper"] = vec![unit; 2].into();
+        let settings = common::parse(&value);
+        let points = common::lattice::<2>(10, 0.4).into_iter().map(|x| x * unit);
+        let mut particles = common::particles(points.collect());
+        let mut frame = Frame::default();
+        frame.search(&settings, &mut particles, Travel::default(), true);
+        let volumes = frame.stencil.volume.iter().map(|volume| volume / (unit * unit)).collect::<Vec<_>>();
+        (particles.id[..particles.real].to_vec(), listed(&frame, &particles, settings.support_radius()), volumes)
+    });
+    assert_eq!(plain, scaled);
+}
+
 /// Pairs that come at each other at the largest speed, and then by nearly all of the skin, become neighbours from the farthest there is.
 #[test]
 fn what_comes_head_on_at_full_speed_is_found() {
