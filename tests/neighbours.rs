@@ -149,6 +149,26 @@ fn a_list_is_renewed_when_anything_strays_far() {
     check_moved(common::lattice::<2>(12, 0.3), "none", 0.05, 2.0).expect("the list is complete");
 }
 
+/// A search that may put the particles into the order of its cells moves each whole, and next to one another those that are near.
+#[test]
+fn particles_are_put_into_the_order_of_the_cells() {
+    let settings = common::settings::<2>(0.05, "none");
+    let points = common::lattice::<2>(20, 0.3);
+    let mut particles = common::particles((0..400).map(|i| points[i * 7919 % 400]).collect());
+    particles.velocity.copy_from_slice(&particles.position);
+    let start = particles.clone();
+    let mut frame = Frame::default();
+    frame.search(&settings, &mut particles, Travel::default(), true);
+    for i in 0..400 {
+        let from = particles.id[i] as usize;
+        assert_eq!([particles.position[i], particles.velocity[i]], [start.position[from]; 2]);
+    }
+    let step = |position: &[Vector<2>]| position.windows(2).map(|two| (two[1] - two[0]).norm()).sum::<f64>() / 400.0;
+    assert!(step(&particles.position) < 3.0 * 0.05 && step(&start.position) > 6.0 * 0.05);
+    particles.id.sort_unstable();
+    assert_eq!(particles.id, start.id);
+}
+
 /// A unit of length 2^10 times as short gives the same neighbours, and volumes 2^20 times as large.
 #[test]
 fn the_unit_of_length_does_not_matter() {
