@@ -81,6 +81,17 @@ fn fluid_that_crosses_an_outlet_has_no_pressure_and_counts_as_mass() {
     assert_eq!(particles.kind, [ParticleKind::Fluid]);
 }
 
+/// The outlet's buffer ends at its length beyond the side: what goes further is no longer there, and is not counted again as mass.
+#[test]
+fn particles_go_at_the_end_of_the_outlets_buffer() {
+    let settings = common::parse(&box_between(json!([["inlet", "outlet"], ["slip", "slip"]])));
+    let end = 1.0 + settings.buffer_length();
+    let mut particles = common::particles([end - 0.01, end + 0.01, end + 5.0].map(|x| Vector::from([x, 1.0])).to_vec());
+    particles.kind.fill(ParticleKind::Outlet);
+    let flow = end_step(&mut particles, &settings, &Grid::default(), &mut 1000);
+    assert_eq!((&particles.id[..], particles.real, flow.outflow), (&[0][..], 1, 0.0));
+}
+
 /// Of the particles around, the nearest inlet particle counts, not fluid, and no image.
 #[test]
 fn a_refilled_particle_has_the_pressure_of_the_nearest_inlet_particle() {
