@@ -10,7 +10,7 @@ from alsph.cases import Cylinder
 from alsph.config import Config
 from alsph.errors import ConfigError, RunFolderError
 from alsph.io import RunFolder
-from alsph.measures import Measure
+from alsph.measures import Measure, Profile
 from synthetic import CIRCULATION, DRAG, LIFT, STROUHAL, signals, write_run
 
 
@@ -109,6 +109,7 @@ def test_a_run_that_has_just_begun_gives_nan_and_reasons(damaged):
     assert np.isnan(run.momentum_balance((2, -2), (6, 2))).all()
     assert "0 steps" in repr(run) or "tU/D = 0" in repr(run)
     assert run.summary()["steps"] == 0 and run._repr_html_()
+    assert run.summary()["iterations of a step"] == "at most 2, then 4 projection sweeps"
     with pytest.raises(RunFolderError, match="no snapshot yet"):
         run.snapshot()
 
@@ -229,6 +230,17 @@ def test_coefficients_are_twice_the_forces_of_history(folder):
     assert run._iterations() == "5 of at most 2, then 4 projection sweeps"
 
 
+def test_what_an_older_version_has_not_recorded_is_not_known(damaged):
+    header, *rows = [line.split(",") for line in (damaged / "history.csv").read_text().splitlines()]
+    kept = [k for k, name in enumerate(header) if "torque" not in name and name != "cylinder_viscous_force_y"]
+    assert len(header) - len(kept) == 3
+    (damaged / "history.csv").write_text("".join(",".join(row[k] for k in kept) + "\n" for row in [header, *rows]))
+    run = Run(damaged)
+    assert np.isnan(run.moment_coefficient()).all() and math.isnan(run.moment().mean)
+    assert np.isnan(run.coefficient("y")).all() and np.isnan(run.coefficient("y", "viscous")).all()
+    assert run.lift.pressure == pytest.approx(0, abs=0.05) and run.drag.mean == pytest.approx(DRAG, rel=0.01)
+
+
 def test_the_summary_of_a_run(folder):
     run = Run(folder)
     shown = {name: str(value) for name, value in run.summary().items()}
@@ -326,6 +338,7 @@ def test_figures_are_saved_where_they_shall_be_and_carry_the_remarks(folder, tmp
         ("field", run.plot_field("pressure", 30.0, tmp_path / "field.png", limit=0.25, view=(2, 6, -2, 2))),
         ("surface", run.plot_pressure_coefficient(tmp_path / "surface.png", curve)),
         ("ledger", run.plot_ledger(tmp_path / "ledger.png")),
+        ("profile", run.plot_profile(Profile("u", ("x", "y"), curve, curve, "theory"), tmp_path / "profile.png")),
     ):
         assert (tmp_path / f"{name}.png").stat().st_size > 1000
         assert remarks.brief(run.remarks) in [text.get_text() for text in figure.texts]
@@ -334,7 +347,10 @@ def test_figures_are_saved_where_they_shall_be_and_carry_the_remarks(folder, tmp
             assert "30" in figure.axes[0].get_title() + figure.axes[0].get_title("left")
         if name == "surface":
             assert any(np.array_equal(line.get_ydata(), curve[1]) for line in figure.axes[0].lines)
-    assert len(list(tmp_path.glob("*.png"))) == 5 and run.plot_forces().axes
+        if name in ("spectrum", "profile"):
+            legend = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+            assert legend == (["shedding"] if name == "spectrum" else ["computed", "reference: theory"])
+    assert len(list(tmp_path.glob("*.png"))) == 6 and run.plot_forces().axes
 
 
 @pytest.mark.parametrize("status", ["starting", "running"])
