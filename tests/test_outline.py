@@ -158,6 +158,7 @@ def test_bodies_have_forces_of_their_own_that_add_up(tmp_path):
         ("0,5 0,5\n1,5 0,5\n1,5\n1,5 1,5\n", r"foil\.txt:3: .*: commas divide numbers here, and are decimal points in"),
         ("Square\n-2.0 3.0 -2.5 3.5\n5\n" + SQUARE, r'foil\.txt:3: "5": 4 points follow'),
         ("5\n" + SQUARE, r'foil\.txt:1: "5": 4 points follow'),
+        ("20 22\n" + rows(UPPER) + "\n" + rows(LOWER), r'foil\.txt:1: "20 22": 21 and 21 points follow'),
         ("5 1\n" + SQUARE, r'foil\.txt:1: "5 1": a count of points \(4 follow\) or a point\?'),
         ("4 1\n3 3\n1 3\n0 1\n2 0\n", r'foil\.txt:1: "4 1": a count of points \(4 follow\) or a point\?'),
         ("0 0\n1 0\n", r"foil\.txt:1: .*: begins a curve of too few points"),
