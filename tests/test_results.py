@@ -6,12 +6,12 @@ import h5py
 import numpy as np
 import pytest
 from alsph import Run, analysis, reading, remarks, sampling
-from alsph.cases import Cylinder
+from alsph.cases import Body, Couette, Cylinder
 from alsph.config import Config
 from alsph.errors import ConfigError, RunFolderError
 from alsph.io import RunFolder
 from alsph.measures import Measure, Profile
-from synthetic import CIRCULATION, DRAG, LIFT, STROUHAL, signals, write_run
+from synthetic import CIRCULATION, DRAG, LIFT, STROUHAL, history, signals, write_run
 
 
 @pytest.fixture(scope="module")
@@ -239,6 +239,25 @@ def test_what_an_older_version_has_not_recorded_is_not_known(damaged):
     assert np.isnan(run.moment_coefficient()).all() and math.isnan(run.moment().mean)
     assert np.isnan(run.coefficient("y")).all() and np.isnan(run.coefficient("y", "viscous")).all()
     assert run.lift.pressure == pytest.approx(0, abs=0.05) and run.drag.mean == pytest.approx(DRAG, rel=0.01)
+
+
+def test_loads_are_those_of_all_bodies_together_or_of_the_first_wall(tmp_path):
+    path = tmp_path / "two.txt"
+    path.write_text("0 0\n.5 0\n.5 .5\n0 .5\n\n1.5 0\n2 0\n2 .5\n1.5 .5\n")
+    for case, names, share in ((Body(shape=path), ["body_1", "body_2"], 4), (Couette(), ["lower", "upper"], 1)):
+        folder = RunFolder(tmp_path / case.name)
+        folder.create(Config(case))
+        folder.announce(Config(case))
+        rows = history(1.0)
+        loads = {name: np.concatenate([each, 3 * each], axis=1) for name, each in rows.items() if each.ndim == 3}
+        folder.append_history(rows | loads, names)
+        run = Run(folder.path)
+        drag, lift = rows["pressure_force"][:, 0].T * 2
+        assert run.coefficient("x", "pressure") == pytest.approx(share * drag)
+        assert run.coefficient("y", "pressure", names[1]) == pytest.approx(3 * lift)
+        if share == 4:  # lifts that act a distance before the point put the nose up
+            behind = np.add(case.bodies()[0]["center"], (1.5, 0))
+            assert run.moment_coefficient("pressure", about=behind) == pytest.approx(1.5 * share * lift / 2**2)
 
 
 def test_the_summary_of_a_run(folder):
