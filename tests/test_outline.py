@@ -145,6 +145,7 @@ def test_bodies_have_forces_of_their_own_that_add_up(tmp_path):
         (SQUARE.replace("0.5 0.5\n-", "0.5, o.5\n-"), r"foil\.txt:3: .*: two numbers expected"),
         (SQUARE.replace("0.5 -0.5\n", "0.5mm -0.5mm\n"), r"foil\.txt:1: .*: two numbers expected"),
         (SQUARE.replace("0.5 0.5\n-", "0.5.1 0.5\n-"), r"foil\.txt:3: .*: two numbers expected"),
+        (SQUARE.replace("0.5 0.5\n-", "0.5 0.5X\n-"), r"foil\.txt:3: .*: two numbers expected"),
         (SQUARE.replace("0.5 0.5\n-", "0.5\n-"), r'foil\.txt:3: "0.5": two numbers expected'),
         (SQUARE.replace("-0.5 -0.5", "-0.5 -0.5 0"), r'foil\.txt:1: "-0.5 -0.5 0": two numbers expected'),
         (SQUARE.replace("\n", " 0.0\n"), r"foil\.txt:1: .*: two numbers expected"),
@@ -250,6 +251,11 @@ def test_a_curve_of_the_most_points_is_read_and_one_more_refused(more, tmp_path)
     else:
         (disc,) = read(tmp_path, content).polygons
         assert len(disc.exterior.coords) == 20_001 and disc.area == pytest.approx(np.pi, rel=1e-6)
+
+
+def test_a_point_that_might_be_a_count_and_comes_again_is_a_point(tmp_path):
+    (box,) = read(tmp_path, "4 0\n4 1\n0 1\n0 0\n4 0\n").polygons
+    assert box.equals(shapely.box(0, 0, 4, 1))
 
 
 def test_a_count_of_all_points_does_not_join_two_bodies(tmp_path):
