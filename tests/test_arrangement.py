@@ -201,6 +201,50 @@ def test_particles_midway_between_parallel_faces_have_the_normal_of_one():
     assert np.abs(midway.normal[0]) == pytest.approx([1, 0]) and midway.depth == pytest.approx([0.1])
 
 
+@pytest.mark.parametrize("lower", [-0.3, 0.1])  # symmetric or not
+def test_second_faces_are_those_within_the_layers_of_a_thick_plate(lower):
+    """The third row of a plate 6 Δx thick is 3.5 Δx off the far face: within four layers, not within three."""
+    plate = shapely.box(-1, lower, 1, lower + 0.6)
+    for layers, seconds in ((3, 0), (4, 2 * 14)):
+        solid = thin.solid(plate, 0.1, layers)
+        height = np.abs(solid.position[:, 1] - lower - 0.3)
+        lattice = geometry.cells(plate, 0.1)
+        depth = np.minimum(1 - np.abs(lattice[:, 0]), 0.3 - np.abs(lattice[:, 1] - lower - 0.3))
+        assert same(np.unique(solid.position.round(9), axis=0), lattice[depth < layers * 0.1])
+        assert len(solid.depth) == np.count_nonzero(depth < layers * 0.1) + seconds
+        second = np.abs(solid.depth - 0.35) < 1e-9
+        assert np.count_nonzero(second) == seconds and height[second] == pytest.approx(0.05)
+        assert np.abs(solid.position[second, 0]).max(initial=0) < 0.7
+        away = np.sign(lower + 0.3 - solid.position[second, 1])
+        assert solid.normal[second] == pytest.approx(np.stack([0 * away, away], axis=1), abs=1e-6)
+
+
+def test_a_row_on_the_axis_of_a_symmetric_body_is_there_once():
+    solid = thin.solid(shapely.box(-0.25, -0.25, 0.25, 0.25), 0.1, 2)
+    x = 0.1 * np.arange(-2, 3)
+    assert same(solid.position, geometry.lattice(x, x)[np.arange(25) != 12])
+    axis = solid.position[:, 1] == 0
+    assert np.count_nonzero(axis) == 4
+    assert solid.normal[axis] == pytest.approx(np.sign(solid.position[axis]), abs=1e-6)
+
+
+@pytest.mark.parametrize("turn", [0, 17])  # symmetric or not
+def test_the_arrangement_does_not_depend_on_the_unit_of_length(turn):
+    """Powers of two do not even change how numbers are rounded, so that equals are chosen between alike."""
+    disc = shapely.Polygon(0.5 * ring(90) / np.hypot(*ring(90)[0]))
+    body = shapely.affinity.rotate(disc.union(shapely.box(0.3, -0.15, 0.9, 0.15)), turn, origin=(0, 0))
+    found = []
+    for unit in (2.0**-6, 2.0**6):
+        spacing = 0.1 * unit
+        carried = thin.carried(shapely.affinity.scale(body, unit, unit, origin=(0, 0)), spacing)
+        solid = thin.solid(carried, spacing, 3)
+        cells = geometry.lattice(*2 * [geometry.symmetric_centres(24, spacing)])
+        fluid = packing.pack(cells, carried, solid.position, spacing)
+        found.append([carried.area / unit**2, solid.position / unit, solid.normal, solid.depth / unit, fluid / unit])
+    assert all(one == pytest.approx(other, rel=1e-9, abs=1e-9) for one, other in zip(*found, strict=True))
+    assert thin.is_symmetric(carried) == (turn == 0) and len(fluid) == pytest.approx(24**2 - 100 * body.area, abs=2)
+
+
 def test_heights_above_a_body():
     points = np.array([[0.5, 1.5], [0.5, 0.8], [2.0, 2.0], [1.3, 0.5], [-0.45, 0.5]])
     assert packing._height(SQUARE, points) == pytest.approx([0.5, -0.2, np.sqrt(2), 0.3, 0.45])
@@ -244,9 +288,15 @@ def test_fluid_that_is_even_stays_and_the_rest_moves_apart():
     fluid = packing.pack(cells, body, solid, spacing)
     assert same(fluid, cells[~geometry.inside(body, cells)])
     wider = shapely.box(-0.25, -0.25, 0.25, 0.25)
-    fluid = packing.pack(cells, wider, geometry.body_layers(wider, spacing, 3).position, spacing)
+    solid = geometry.body_layers(wider, spacing, 3).position
+    fluid = packing.pack(cells, wider, solid, spacing)
     assert len(fluid) == 376  # 400 - 25 are not in pairs
     assert same(fluid, fluid * (1, -1)) and packing._height(wider, fluid).min() > 0.39 * spacing
     assert KDTree(fluid).query(fluid, 2)[0][:, 1].min() > 0.75 * spacing
+    height = packing._height(wider, fluid)
+    free = fluid[(height > 0.41 * spacing) & (height < 4 * spacing)]
+    offset = (free[:, None] - np.concatenate([fluid, solid])) / spacing
+    push = (offset * np.exp(-0.5 * (offset**2).sum(axis=2, keepdims=True) / 0.6**2)).sum(axis=1)
+    assert np.hypot(*push.T).max() < 0.006  # a neighbour a spacing off pushes with 0.25
     far = cells[packing._height(wider, cells) > 4 * spacing]
     assert same(fluid[: len(far)], far)

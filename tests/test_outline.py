@@ -51,6 +51,8 @@ def read(folder: Path, content: str | bytes) -> Outline:
         "x,y\n" + SQUARE.replace(" ", ","),
         '"x";"y"\n' + SQUARE.replace(" ", ";"),
         "Square 0012\nsecond title\n\n" + SQUARE,
+        SQUARE.replace("\n0.5 0.5", "\n# the right side\n0.5 0.5"),
+        "".join(f'"{x}";"{y}"\n' for x, y in map(str.split, SQUARE.splitlines())),
         "# -1 -1\n% a comment\n! another\n// one more\n" + SQUARE.replace("5\n", "5 # a corner\n"),
         "4\n" + SQUARE,
         "4 1\n" + SQUARE,
@@ -143,6 +145,7 @@ def test_bodies_have_forces_of_their_own_that_add_up(tmp_path):
         (SQUARE.replace("0.5 0.5\n-", "0.5, o.5\n-"), r"foil\.txt:3: .*: two numbers expected"),
         (SQUARE.replace("0.5 -0.5\n", "0.5mm -0.5mm\n"), r"foil\.txt:1: .*: two numbers expected"),
         (SQUARE.replace("0.5 0.5\n-", "0.5.1 0.5\n-"), r"foil\.txt:3: .*: two numbers expected"),
+        (SQUARE.replace("0.5 0.5\n-", "0.5 0.5X\n-"), r"foil\.txt:3: .*: two numbers expected"),
         (SQUARE.replace("0.5 0.5\n-", "0.5\n-"), r'foil\.txt:3: "0.5": two numbers expected'),
         (SQUARE.replace("-0.5 -0.5", "-0.5 -0.5 0"), r'foil\.txt:1: "-0.5 -0.5 0": two numbers expected'),
         (SQUARE.replace("\n", " 0.0\n"), r"foil\.txt:1: .*: two numbers expected"),
@@ -154,7 +157,9 @@ def test_bodies_have_forces_of_their_own_that_add_up(tmp_path):
         (SQUARE.replace("-0.5 -0.5", "nan -0.5"), r"foil\.txt:1: .*: finite numbers expected"),
         (SQUARE.replace("0.5 0.5\n-", "1e999 0.5\n-"), r"foil\.txt:3: .*: no lengths in D"),
         ("0,5 0,5\n1,5 0,5\n1,5\n1,5 1,5\n", r"foil\.txt:3: .*: commas divide numbers here, and are decimal points in"),
+        ("Square\n-2.0 3.0 -2.5 3.5\n5\n" + SQUARE, r'foil\.txt:3: "5": 4 points follow'),
         ("5\n" + SQUARE, r'foil\.txt:1: "5": 4 points follow'),
+        ("20 22\n" + rows(UPPER) + "\n" + rows(LOWER), r'foil\.txt:1: "20 22": 21 and 21 points follow'),
         ("5 1\n" + SQUARE, r'foil\.txt:1: "5 1": a count of points \(4 follow\) or a point\?'),
         ("4 1\n3 3\n1 3\n0 1\n2 0\n", r'foil\.txt:1: "4 1": a count of points \(4 follow\) or a point\?'),
         ("0 0\n1 0\n", r"foil\.txt:1: .*: begins a curve of too few points"),
@@ -205,7 +210,7 @@ def test_no_folder_device_pipe_or_giant_is_read(tmp_path):
     for path in (tmp_path, tmp_path / "pipe", "/dev/zero", "/dev/null", "/dev/stdin"):
         with pytest.raises(ConfigError, match="not a file but a folder, a device or a pipe|neither"):
             Body(shape=str(path))
-    with pytest.raises(ConfigError, match="has 8,192 MiB"):
+    with pytest.raises(ConfigError, match="has 8,192 MiB.* 1 MiB"):
         Body(shape=tmp_path / "giant")
     for path in ("", "no\0file", 300 * "a", "missing"):
         with pytest.raises(ConfigError, match="neither|a folder"):
@@ -234,6 +239,29 @@ def test_what_takes_long_to_sort_out_is_refused_soon(content, problem, tmp_path)
     with pytest.raises(ConfigError, match=problem):
         read(tmp_path, content)
     assert clock.monotonic() - start < 10
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_a_curve_of_the_most_points_is_read_and_one_more_refused(more, tmp_path):
+    angle = 2 * np.pi * np.arange(20_000 + more) / (20_000 + more)
+    content = rows(np.stack([np.cos(angle), np.sin(angle)], axis=1), "{:.12f} {:.12f}")
+    if more:
+        with pytest.raises(ConfigError, match="20,001 points"):
+            read(tmp_path, content)
+    else:
+        (disc,) = read(tmp_path, content).polygons
+        assert len(disc.exterior.coords) == 20_001 and disc.area == pytest.approx(np.pi, rel=1e-6)
+
+
+def test_a_point_that_might_be_a_count_and_comes_again_is_a_point(tmp_path):
+    (box,) = read(tmp_path, "4 0\n4 1\n0 1\n0 0\n4 0\n").polygons
+    assert box.equals(shapely.box(0, 0, 4, 1))
+
+
+def test_a_count_of_all_points_does_not_join_two_bodies(tmp_path):
+    other = SQUARE.replace("0.5 ", "1.5 ").replace("-1.5 ", "1.0 ")
+    one, two = read(tmp_path, f"8 0\n{SQUARE}\n{other}").polygons
+    assert one.equals(shapely.box(-0.5, -0.5, 0.5, 0.5)) and two.equals(shapely.box(1, -0.5, 1.5, 0.5))
 
 
 STARS = st.lists(st.floats(0.2, 1.0), min_size=3, max_size=30)

@@ -6,12 +6,12 @@ import h5py
 import numpy as np
 import pytest
 from alsph import Run, analysis, reading, remarks, sampling
-from alsph.cases import Cylinder
+from alsph.cases import Body, Couette, Cylinder
 from alsph.config import Config
 from alsph.errors import ConfigError, RunFolderError
 from alsph.io import RunFolder
-from alsph.measures import Measure
-from synthetic import CIRCULATION, DRAG, LIFT, STROUHAL, signals, write_run
+from alsph.measures import Measure, Profile
+from synthetic import CIRCULATION, DRAG, LIFT, STROUHAL, history, signals, write_run
 
 
 @pytest.fixture(scope="module")
@@ -109,6 +109,7 @@ def test_a_run_that_has_just_begun_gives_nan_and_reasons(damaged):
     assert np.isnan(run.momentum_balance((2, -2), (6, 2))).all()
     assert "0 steps" in repr(run) or "tU/D = 0" in repr(run)
     assert run.summary()["steps"] == 0 and run._repr_html_()
+    assert run.summary()["iterations of a step"] == "at most 2, then 4 projection sweeps"
     with pytest.raises(RunFolderError, match="no snapshot yet"):
         run.snapshot()
 
@@ -229,6 +230,36 @@ def test_coefficients_are_twice_the_forces_of_history(folder):
     assert run._iterations() == "5 of at most 2, then 4 projection sweeps"
 
 
+def test_what_an_older_version_has_not_recorded_is_not_known(damaged):
+    header, *rows = [line.split(",") for line in (damaged / "history.csv").read_text().splitlines()]
+    kept = [k for k, name in enumerate(header) if "torque" not in name and name != "cylinder_viscous_force_y"]
+    assert len(header) - len(kept) == 3
+    (damaged / "history.csv").write_text("".join(",".join(row[k] for k in kept) + "\n" for row in [header, *rows]))
+    run = Run(damaged)
+    assert np.isnan(run.moment_coefficient()).all() and math.isnan(run.moment().mean)
+    assert np.isnan(run.coefficient("y")).all() and np.isnan(run.coefficient("y", "viscous")).all()
+    assert run.lift.pressure == pytest.approx(0, abs=0.05) and run.drag.mean == pytest.approx(DRAG, rel=0.01)
+
+
+def test_loads_are_those_of_all_bodies_together_or_of_the_first_wall(tmp_path):
+    path = tmp_path / "two.txt"
+    path.write_text("0 0\n.5 0\n.5 .5\n0 .5\n\n1.5 0\n2 0\n2 .5\n1.5 .5\n")
+    for case, names, share in ((Body(shape=path), ["body_1", "body_2"], 4), (Couette(), ["lower", "upper"], 1)):
+        folder = RunFolder(tmp_path / case.name)
+        folder.create(Config(case))
+        folder.announce(Config(case))
+        rows = history(1.0)
+        loads = {name: np.concatenate([each, 3 * each], axis=1) for name, each in rows.items() if each.ndim == 3}
+        folder.append_history(rows | loads, names)
+        run = Run(folder.path)
+        drag, lift = rows["pressure_force"][:, 0].T * 2
+        assert run.coefficient("x", "pressure") == pytest.approx(share * drag)
+        assert run.coefficient("y", "pressure", names[1]) == pytest.approx(3 * lift)
+        if share == 4:  # lifts that act a distance before the point put the nose up
+            behind = np.add(case.bodies()[0]["center"], (1.5, 0))
+            assert run.moment_coefficient("pressure", about=behind) == pytest.approx(1.5 * share * lift / 2**2)
+
+
 def test_the_summary_of_a_run(folder):
     run = Run(folder)
     shown = {name: str(value) for name, value in run.summary().items()}
@@ -334,7 +365,17 @@ def test_figures_are_saved_where_they_shall_be_and_carry_the_remarks(folder, tmp
             assert "30" in figure.axes[0].get_title() + figure.axes[0].get_title("left")
         if name == "surface":
             assert any(np.array_equal(line.get_ydata(), curve[1]) for line in figure.axes[0].lines)
+        if name == "spectrum":
+            assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == ["shedding"]
     assert len(list(tmp_path.glob("*.png"))) == 5 and run.plot_forces().axes
+
+
+def test_a_profile_is_drawn_beside_its_reference(folder, tmp_path):
+    run, x = Run(folder), np.arange(3.0)
+    figure = run.plot_profile(Profile("u", ("x", "y"), (x, x**2), (x, 2 * x), "theory"), tmp_path / "profile.png")
+    drawn = {line.get_label(): line.get_ydata().tolist() for line in figure.axes[0].lines}
+    assert drawn == {"computed": [0, 1, 4], "reference: theory": [0, 2, 4]} and (tmp_path / "profile.png").exists()
+    assert remarks.brief(run.remarks) in [text.get_text() for text in figure.texts]
 
 
 @pytest.mark.parametrize("status", ["starting", "running"])

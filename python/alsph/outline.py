@@ -13,7 +13,7 @@ import re
 import stat
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import chain, pairwise
+from itertools import accumulate, chain, pairwise
 from pathlib import Path
 from typing import Self
 
@@ -277,9 +277,13 @@ def _without_counts(parts: list[Part], name: str) -> list[Part]:
         return parts
     parts[0].points = points[: len(parts[0].points) - 1]
     parts = [part for part in parts if part.points]
-    if len(parts) == 1 and len(points) == count + other:
-        parts = [Part(parts[0].before, [], points[: int(count)]), Part(Line(0, ""), [], points[int(count) :])]
-    return [part for part in parts if part.points]
+    if other == 0 or len(points) != count + other:
+        return parts
+    if len(parts) == 1:
+        return [Part(parts[0].before, [], points[: int(count)]), Part(Line(0, ""), [], points[int(count) :])]
+    if int(count) not in accumulate(len(part.points) for part in parts):
+        raise _refusal(name, first, f"{' and '.join(str(len(part.points)) for part in parts)} points follow")
+    return parts
 
 
 PLAIN = 0.1

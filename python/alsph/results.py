@@ -402,7 +402,7 @@ class Run:
         """
         steps = len(self.history["time"])
         results: dict[str, Any] = {
-            "case": self.case.get("case", "unknown"),
+            "case": self.config.case.name,
             "Reynolds number": Estimate(self.case["reynolds"]),
             "resolution, D/Δx": self.case["resolution"],
             "status": self.status,
