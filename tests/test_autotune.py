@@ -11,7 +11,7 @@ from alsph.errors import ConfigError
 
 @pytest.fixture(scope="module")
 def tuning():
-    case = TaylorGreen(resolution=16, reynolds=100, max_iterations=5, projection_sweeps=0)
+    case = TaylorGreen(resolution=16, max_iterations=5, projection_sweeps=0, penalty_constant=100.0)
     return autotune(case, 5e-3, develop=0.2, probe=0.3, threads=1, progress=False)
 
 

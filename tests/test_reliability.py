@@ -356,7 +356,7 @@ def test_a_file_that_is_damaged_in_mid_run_is_set_aside(tmp_path, small, name, m
 
 
 def test_a_row_that_cannot_be_read_costs_no_other(tmp_path, small):
-    path = small.run(tmp_path / "run", until=0.1, progress=False).path
+    path = small.replace(time_step=0.05).run(tmp_path / "run", until=0.1, progress=False).path
     lines = (path / "history.csv").read_text().splitlines(True)
     (path / "history.csv").write_text("".join([*lines[:5], "nonsense\n", *lines[6:]]))
     steps = alsph.open_run(resume(path, until=0.2, progress=False).path).history["step"]
@@ -448,7 +448,7 @@ def test_what_the_particles_were_made_for_cannot_change(tmp_path, small):
 
 # Breakdowns
 
-UNSTABLE = {"time_step": 0.2, "adaptive_time_step": False}
+UNSTABLE = {"time_step": 0.2, "penalty_constant": 100.0, "adaptive_time_step": False}
 
 
 @pytest.mark.filterwarnings("ignore:.*expect divergence")

@@ -23,7 +23,7 @@ from processes import bits
 
 SMALL = {"resolution": 8, "length": 5.0, "height": 4.0, "upstream": 2.0}
 OUTPUTS = {"output_interval": 0.05, "surface_interval": 0.01}
-UNSTABLE = {"time_step": 0.2, "adaptive_time_step": False}
+UNSTABLE = {"time_step": 0.2, "penalty_constant": 100.0, "adaptive_time_step": False}
 
 
 def pulsation(position, time, strength=0.3):

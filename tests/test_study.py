@@ -176,7 +176,7 @@ def test_misspelt_results_are_warned_of_and_lose_nothing(done):
 
 
 def test_a_ladder_ends_with_the_run_that_diverges_which_is_a_result(tmp_path):
-    base = VORTEX | {"adaptive_time_step": False}
+    base = VORTEX | {"adaptive_time_step": False, "penalty_constant": 100.0}
     ladder = declare(base=base, sweep=Sweep(until_diverged={"time_step": [0.05, 0.3, 0.4, 0.5]}))
     results = study.run(ladder, tmp_path, progress=False)
     assert [row["status"] for row in results.rows] == ["finished", "diverged", "skipped", "skipped"]

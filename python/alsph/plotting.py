@@ -288,9 +288,8 @@ def spectrum(runs: dict[str, Run], body: str | None = None) -> Figure:
     grid = figure.subplots(2, 1, sharex=True)
     for axes, axis, symbol in zip(grid, "xy", ("C_D", "C_L"), strict=True):
         for name, run in runs.items():
-            time, window = run.history["time"], run.window
+            time, window, coefficient = run.history["time"], run.window, run.coefficient(axis, body=body)
             if window.edges.size:
-                coefficient = run.coefficient(axis, body=body)
                 lines = analysis.amplitude_spectrum(time, coefficient, window.start, window.end)
                 label = f"{name}, {DEVELOPING}" if window.developing else name
                 axes.loglog(*(a[1:] for a in lines), lw=0.8, label=label)
