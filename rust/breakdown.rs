@@ -107,7 +107,12 @@ pub fn likely_cause<const D: usize>(
     time_step: f64,
     limits: TimeStepLimits,
 ) -> String {
-    let bounds = [("penalty", limits.penalty), ("viscous", limits.viscous), ("body force", limits.body_force)];
+    let bounds = [
+        ("Courant", limits.courant),
+        ("penalty", limits.penalty),
+        ("viscous", limits.viscous),
+        ("body force", limits.body_force),
+    ];
     let (name, bound) = bounds.into_iter().fold(bounds[0], |least, next| if next.1 < least.1 { next } else { least });
     // A hair of room, because a step at its bound is not beyond it.
     if time_step > 1.001 * bound {

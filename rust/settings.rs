@@ -46,6 +46,16 @@ pub enum Shifting {
     None,
 }
 
+/// How far each of the projection sweeps goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SweepWeights {
+    /// All as far as the shortest waves allow.
+    Equal,
+    /// Together the polynomial of Chebyshev that is least over all waves but the longest.
+    Chebyshev,
+}
+
 /// Velocity that a solid particle shows to the viscous term of a fluid neighbour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -122,6 +132,9 @@ pub struct Settings {
     pub body_force: Vec<f64>,
     /// Largest Δt.
     pub time_step: f64,
+    /// Largest u_max Δt/Δx of an adaptive step; no bound if not given.
+    #[serde(default)]
+    pub courant: Option<f64>,
     /// Take less than `time_step` where the stability law asks for it.
     pub adaptive_time_step: bool,
     /// Time from which on every step is `time_step` all the same.
@@ -129,7 +142,7 @@ pub struct Settings {
     /// Speed that no particle reaches unless the computation has gone wrong; none if not given.
     #[serde(default)]
     pub velocity_limit: Option<f64>,
-    /// Fraction of the stability law that an adaptive step may use.
+    /// Fraction of the penalty's stability law that is used: by an adaptive step for a given C_BV, else by r_AL for a given step.
     pub time_step_safety: f64,
     pub derivative_frame: DerivativeFrame,
     /// Search the neighbours again in every iteration (Fatehi et al. 2019). Only with the updated frame.
@@ -138,10 +151,14 @@ pub struct Settings {
     pub max_iterations: usize,
     /// Projection sweeps after the iterations of a step; none in the paper.
     pub projection_sweeps: usize,
+    pub sweep_weights: SweepWeights,
     /// ε of (13), 1/time.
     pub divergence_tolerance: f64,
-    /// C_BV.
-    pub penalty_constant: f64,
+    /// C_BV, as in the paper; if not given r_AL Δt λ_max is that of the stability law, whatever the step.
+    #[serde(default)]
+    pub penalty_constant: Option<f64>,
+    /// Weight of the ∇²u of the new velocity in the viscous term, the rest being that of the old: 1 in (8), ½ of second order in time.
+    pub viscous_theta: f64,
     pub velocity_laplacian: VelocityLaplacian,
     /// Correct the scalar Laplacians so that they vanish for linear fields on any particle arrangement.
     pub laplacian_correction: bool,
@@ -164,7 +181,9 @@ const MOST_PASSES: usize = 1000;
 /// Upper bounds of Δt; infinite where one does not apply.
 #[derive(Clone, Copy, Debug)]
 pub struct TimeStepLimits {
-    /// r_AL Δt λ_max < 2 (method section 3).
+    /// The Courant number's.
+    pub courant: f64,
+    /// r_AL Δt λ_max < 2 for a given C_BV (method section 3).
     pub penalty: f64,
     /// 0.125 h²/ν.
     pub viscous: f64,
@@ -269,11 +288,21 @@ impl Settings {
     pub fn time_step_limits(&self, velocity_max: f64, largest_eigenvalue: f64) -> TimeStepLimits {
         let gravity = self.body_force.iter().map(|g| g * g).sum::<f64>().sqrt();
         let h = self.smoothing_length();
-        let wave = velocity_max * (self.penalty_constant * largest_eigenvalue / 2.0).sqrt();
+        let crossing = self.particle_spacing / velocity_max;
+        let stable = |constant: f64| crossing / (constant * largest_eigenvalue / 2.0).sqrt();
         TimeStepLimits {
-            penalty: self.particle_spacing / wave,
+            courant: self.courant.map_or(f64::INFINITY, |courant| courant * crossing),
+            penalty: self.penalty_constant.map_or(f64::INFINITY, stable),
             viscous: self.viscous_limit() * h * h / self.kinematic_viscosity,
             body_force: 0.25 * (h / gravity).sqrt(),
+        }
+    }
+
+    /// r_AL of a step: C_BV u_max² Δt, or what takes r_AL Δt λ_max to the share of the stability law that the safety allows.
+    pub fn penalty(&self, velocity_max: f64, time_step: f64, largest_eigenvalue: f64) -> f64 {
+        match self.penalty_constant {
+            Some(constant) => constant * velocity_max * velocity_max * time_step,
+            None => 2.0 * (self.time_step_safety * self.particle_spacing).powi(2) / (largest_eigenvalue * time_step),
         }
     }
 
@@ -295,6 +324,7 @@ impl Settings {
             ("smoothing_ratio", self.smoothing_ratio),
             ("density", self.density),
             ("time_step", self.time_step),
+            ("courant", self.courant.unwrap_or(1.0)),
             ("time_step_safety", self.time_step_safety),
             ("divergence_tolerance", self.divergence_tolerance),
             ("shift_limit", self.shift_limit),
@@ -315,8 +345,11 @@ impl Settings {
         if !(0.8..=3.0).contains(&self.smoothing_ratio) {
             return Err(setting("smoothing_ratio", format!("must lie in 0.8..3, not {}", self.smoothing_ratio)));
         }
-        if !(1.0..=100.0).contains(&self.penalty_constant) {
-            return Err(setting("penalty_constant", format!("must lie in 1..100, not {}", self.penalty_constant)));
+        if let Some(constant) = self.penalty_constant.filter(|constant| !(1.0..=100.0).contains(constant)) {
+            return Err(setting("penalty_constant", format!("must lie in 1..100, not {constant}")));
+        }
+        if !(0.5..=1.0).contains(&self.viscous_theta) {
+            return Err(setting("viscous_theta", format!("must lie in 0.5..1, not {}", self.viscous_theta)));
         }
         if !(1..=MOST_PASSES).contains(&self.max_iterations) {
             return Err(setting("max_iterations", format!("must lie in 1..{MOST_PASSES}, not {}", self.max_iterations)));

@@ -142,7 +142,7 @@ impl<const D: usize> Simulation<D> {
         let velocity_max = self.velocity_max();
         let time_step = self.time_step(velocity_max)?;
         self.prepare_step(Travel { time_step, velocity_max, fraction: self.settings.derivative_frame.fraction() });
-        let penalty = self.settings.penalty_constant * velocity_max * velocity_max * time_step;
+        let penalty = self.settings.penalty(velocity_max, time_step, self.largest_eigenvalue);
         let (relaxation, dispersion) = (self.relaxation, self.dispersion);
         let step = Step { settings: &self.settings, time_step, penalty, relaxation, dispersion };
 
@@ -213,15 +213,15 @@ impl<const D: usize> Simulation<D> {
             return Ok(settings.time_step);
         }
         let limits = settings.time_step_limits(velocity_max, self.largest_eigenvalue);
-        let penalty = settings.time_step_safety * limits.penalty;
-        if penalty < SMALLEST_TIME_STEP * settings.time_step {
+        let fastest_waves = limits.courant.min(settings.time_step_safety * limits.penalty);
+        if fastest_waves < SMALLEST_TIME_STEP * settings.time_step {
             let velocity = &self.particles.velocity[..self.particles.real];
             let fastest =
                 (0..velocity.len()).max_by(|&a, &b| velocity[a].norm_squared().total_cmp(&velocity[b].norm_squared()));
             let symptom = Symptom { particle: fastest.unwrap_or(0), field: "velocity", value: velocity_max };
-            return Err(self.diverged(symptom, penalty, velocity_max));
+            return Err(self.diverged(symptom, fastest_waves, velocity_max));
         }
-        Ok(settings.time_step.min(penalty).min(limits.viscous).min(limits.body_force))
+        Ok(settings.time_step.min(fastest_waves).min(limits.viscous).min(limits.body_force))
     }
 
     fn diverged(&self, symptom: Symptom, time_step: f64, velocity_max: f64) -> Error {

@@ -9,7 +9,7 @@ mod common;
 
 /// What a configuration chooses, and what from. The first two say what closes the sides, the third whether the body moves, the rest
 /// are settings.
-const FACTORS: [(&str, &[&str]); 13] = [
+const FACTORS: [(&str, &[&str]); 16] = [
     (
         "layout",
         &[
@@ -34,6 +34,9 @@ const FACTORS: [(&str, &[&str]); 13] = [
     ("velocity_laplacian", &["scalar", "vector"]),
     ("laplacian_correction", &["true", "false"]),
     ("projection_sweeps", &["0", "3"]),
+    ("sweep_weights", &["equal", "chebyshev"]),
+    ("penalty_constant", &["100.0", "null"]),
+    ("viscous_theta", &["1.0", "0.5"]),
     ("kernel", &["quintic_spline", "wendland_c2", "wendland_c4"]),
     ("adaptive_time_step", &["true", "false"]),
 ];

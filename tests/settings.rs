@@ -29,13 +29,20 @@ fn settings_beyond_their_bounds_are_refused_by_name() {
         ("/smoothing_ratio", "smoothing_ratio", vec![json!(0.8), json!(3.0)], vec![json!(0.79), json!(3.01), json!(0.0)]),
         ("/density", "density", vec![json!(1e-9)], vec![json!(0.0), json!(-1.0)]),
         ("/time_step", "time_step", vec![json!(1e-9)], vec![json!(0.0), json!(-1.0)]),
+        ("/courant", "courant", vec![json!(1e-9), Value::Null], vec![json!(0.0), json!(-1.0)]),
+        ("/viscous_theta", "viscous_theta", vec![json!(0.5), json!(1.0)], vec![json!(0.49), json!(1.01)]),
         ("/time_step_safety", "time_step_safety", vec![json!(1e-9)], vec![json!(0.0), json!(-1.0)]),
         ("/divergence_tolerance", "divergence_tolerance", vec![json!(1e-9)], vec![json!(0.0), json!(-1.0)]),
         ("/shift_limit", "shift_limit", vec![json!(1e-9)], vec![json!(0.0), json!(-1.0)]),
         ("/velocity_limit", "velocity_limit", vec![json!(1e-9), Value::Null], vec![json!(0.0), json!(-1.0)]),
         ("/kinematic_viscosity", "kinematic_viscosity", vec![json!(0.0)], vec![json!(-1e-9)]),
         ("/shift_coefficient", "shift_coefficient", vec![json!(0.0)], vec![json!(-1e-9)]),
-        ("/penalty_constant", "penalty_constant", vec![json!(1.0), json!(100.0)], vec![json!(0.99), json!(100.01)]),
+        (
+            "/penalty_constant",
+            "penalty_constant",
+            vec![json!(1.0), json!(100.0), Value::Null],
+            vec![json!(0.99), json!(100.01)],
+        ),
         ("/max_iterations", "max_iterations", vec![json!(1), json!(1000)], vec![json!(0), json!(1001)]),
         ("/projection_sweeps", "projection_sweeps", vec![json!(0), json!(1000)], vec![json!(1001)]),
         ("/body_force", "body_force", vec![json!([1.0, -2.0])], vec![json!([1.0]), json!([1.0, 0.0, 0.0])]),
@@ -92,12 +99,28 @@ fn the_time_step_is_limited_by_penalty_friction_and_body_force() {
     };
     let (h, adami, cubic) = (0.2f64 / 3.0, limits("adami"), limits("cubic"));
     // r_AL Δt λ/Δx² = 2 with r_AL = C u² Δt.
+    assert_eq!(adami.courant, f64::INFINITY);
     assert_relative_eq!(adami.penalty, (2.0f64 / 8.0 / 100.0).sqrt() * 0.05 / 2.0, max_relative = 1e-12);
     assert_relative_eq!(adami.viscous, 0.125 * h * h / 0.01, max_relative = 1e-12);
     assert_relative_eq!(cubic.viscous, 0.0625 * h * h / 0.01, max_relative = 1e-12);
     assert_relative_eq!(adami.body_force, 0.25 * (h / 0.5).sqrt(), max_relative = 1e-12);
     let still = common::settings::<2>(0.05, "none").time_step_limits(0.0, 8.0);
     assert!(still.penalty == f64::INFINITY && still.body_force == f64::INFINITY);
+}
+
+/// Without a C_BV of the user's the step goes by its Courant number, and r_AL Δt λ/Δx² is 2 s², whatever the step.
+#[test]
+fn the_penalty_follows_the_step() {
+    let settings = common::parse(&with(&[("/penalty_constant", Value::Null), ("/courant", json!(0.25))]));
+    let limits = settings.time_step_limits(2.0, 8.0);
+    assert!(limits.penalty == f64::INFINITY);
+    assert_relative_eq!(limits.courant, 0.25 * 0.05 / 2.0, max_relative = 1e-12);
+    for time_step in [1e-4, 1e-2] {
+        let relaxed = settings.penalty(2.0, time_step, 8.0) * time_step * 8.0 / (0.05 * 0.05);
+        assert_relative_eq!(relaxed, 2.0 * 0.9 * 0.9, max_relative = 1e-12);
+    }
+    let given = common::parse(&with(&[("/penalty_constant", json!(60.0))]));
+    assert_relative_eq!(given.penalty(2.0, 0.01, 8.0), 60.0 * 4.0 * 0.01, max_relative = 1e-12);
 }
 
 /// Largest eigenvalues of Laplacian and of the divergence of the gradient, and c of the error of the Laplacian of a long wave, from

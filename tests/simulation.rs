@@ -172,18 +172,21 @@ fn a_step_that_would_be_ten_thousand_times_too_small_is_a_breakdown() {
     }
 }
 
-/// The smallest of the user's step and the three limits.
+/// The smallest of the bounds.
 #[test]
 fn friction_and_body_force_limit_the_step() {
-    for (key, chosen) in
-        [("kinematic_viscosity", json!(50.0)), ("body_force", json!([0.0, 1e5])), ("time_step", json!(1e-7))]
-    {
+    for (key, chosen) in [
+        ("kinematic_viscosity", json!(50.0)),
+        ("body_force", json!([0.0, 1e5])),
+        ("time_step", json!(1e-7)),
+        ("courant", json!(0.05)),
+    ] {
         let (mut value, particles) = channel();
         value["time_step"] = 1e-2.into();
         value[key] = chosen;
         let settings = common::parse(&value);
         let limits = settings.time_step_limits(1.0, settings.largest_laplacian_eigenvalue());
-        let expected = [settings.time_step, 0.9 * limits.penalty, limits.viscous, limits.body_force];
+        let expected = [settings.time_step, limits.courant, 0.9 * limits.penalty, limits.viscous, limits.body_force];
         let mut simulation = begun(&value, particles, Clock::default()).expect("valid");
         _ = simulation.advance(1, None);
         let least = expected.into_iter().fold(f64::INFINITY, f64::min);

@@ -76,7 +76,9 @@ def test_initial_vortex_is_divergence_free_and_can_be_left_out():
 def test_engine_accepts_the_settings_and_the_estimate_is_close(model):
     case = model()
     limits = _alsph.time_step_limits(json.dumps(case.settings()), 1.0)
-    assert 0.09 < limits["penalty"] / case.particle_spacing < 0.1
+    assert 0.09 < limits["penalty"] / case.particle_spacing < 0.1 and limits["courant"] == np.inf
+    limits = _alsph.time_step_limits(json.dumps(case.replace(courant=0.3).settings()), 1.0)
+    assert limits["courant"] / case.particle_spacing == pytest.approx(0.3) and limits["penalty"] == np.inf
     assert case.particle_estimate() == pytest.approx(len(case.particles()["kind"]), rel=0.02)
 
 
@@ -89,16 +91,44 @@ def test_algorithms(algorithm, frame, search):
     assert settings["search_every_iteration"] is search
 
 
+def test_the_penalty_follows_the_courant_number(small):
+    case = small.replace(courant=0.25)
+    assert case.largest_time_step == 0.25 and case.expected_time_step() == pytest.approx(0.25 / 1.5)
+    settings = case.settings()
+    assert (settings["penalty_constant"], settings["viscous_theta"], settings["sweep_weights"]) == (
+        None,
+        0.5,
+        "chebyshev",
+    )
+    paper = small.settings()
+    assert (paper["penalty_constant"], paper["viscous_theta"], paper["sweep_weights"]) == (100.0, 1.0, "equal")
+    assert paper["time_step"] == pytest.approx(0.0508 * small.particle_spacing) and paper["courant"] is None
+    with pytest.raises(ConfigError, match="courant and penalty_constant: .* leave one out"):
+        small.replace(courant=0.25, penalty_constant=100.0)
+    simulation = case.simulation()
+    simulation.advance(4)
+    history, spacing = simulation.history(), case.particle_spacing
+    assert history["velocity_max"] * history["time_step"] == pytest.approx(0.25 * spacing)
+    # r_AL Δt λ_max/Δx² is 2 · 0.9², and c² = r_AL/Δt = C_BV u_max².
+    largest = _alsph.time_step_limits(json.dumps(settings), 1.0)["lambda_max"]
+    relaxed = history["penalty_coefficient"] * history["time_step"] * largest / spacing**2
+    assert relaxed == pytest.approx(2 * 0.9**2)
+    constant = history["penalty_coefficient"] / history["time_step"] / history["velocity_max"] ** 2
+    assert constant == pytest.approx(case.penalty_constant_of(case.expected_time_step()))
+
+
 def test_time_step_warning_names_the_limit():
     assert Cylinder().time_step_warning() is None
     fixed = {"adaptive_time_step": False}
-    assert "penalty stability limit 0.06" in Cylinder(time_step=0.08, **fixed).time_step_warning()
+    paper = {"penalty_constant": 100.0}
+    assert "penalty stability limit 0.06" in Cylinder(time_step=0.08, **fixed, **paper).time_step_warning()
+    assert "courant limit 0.2 " in Cylinder(time_step=0.25, courant=0.3, **fixed).time_step_warning()
     assert "viscous stability limit" in Cylinder(reynolds=0.1, **fixed).time_step_warning()
-    assert "expect divergence" in Cylinder(time_step=0.08, adaptive_until=1.0).time_step_warning()
-    for handled in (Cylinder(time_step=0.08), Cylinder(reynolds=0.1)):
+    assert "expect divergence" in Cylinder(time_step=0.08, adaptive_until=1.0, **paper).time_step_warning()
+    for handled in (Cylinder(time_step=0.08, **paper), Cylinder(reynolds=0.1)):
         assert handled.time_step_warning() is None
     with pytest.warns(UserWarning, match="expect divergence"):
-        Cylinder(time_step=0.2, adaptive_time_step=False, resolution=8).simulation()
+        Cylinder(time_step=0.2, resolution=8, **fixed, **paper).simulation()
 
 
 def test_too_much_memory_is_refused_before_it_is_taken():

@@ -83,13 +83,24 @@ def test_plot_in_3d_draws_what_it_can(alsph, tmp_path):
 def test_describe(alsph, small_options):
     code, stdout, _ = alsph("describe", "cylinder", *small_options, "--until", 2)
     assert code == 0
-    for text in ("fluid", "solid", "MiB", "penalty limit", "(binds)", "viscous limit", "Reynolds number", "to t* = 2"):
+    for text in (
+        "fluid",
+        "solid",
+        "MiB",
+        "Mach number",
+        "penalty limit",
+        "(binds)",
+        "viscous limit",
+        "Reynolds number",
+        "to t* = 2",
+    ):
         assert text in stdout
     assert "s a step" in stdout
-    code, stdout, _ = alsph("describe", "cylinder", "--time-step=0.1", "--no-probe")
+    paper = "--penalty-constant=100"
+    code, stdout, _ = alsph("describe", "cylinder", "--time-step=0.1", paper, "--no-probe")
     assert "estimated time" not in stdout
     assert "0.06393 at u_max = 1.5 U (binds)" in stdout and "warning" not in stdout
-    code, stdout, _ = alsph("describe", "cylinder", "--time-step=0.1", "--no-adaptive-time-step", "--no-probe")
+    code, stdout, _ = alsph("describe", "cylinder", "--time-step=0.1", paper, "--no-adaptive-time-step", "--no-probe")
     assert "lies above the penalty stability limit" in stdout
 
 
@@ -126,7 +137,7 @@ def test_mistakes(alsph, tmp_path, monkeypatch, arguments, message):
 
 @pytest.mark.filterwarnings("ignore:.*expect divergence")
 def test_divergence_is_exit_code_1(alsph, tmp_path, small_options):
-    options = ["--time-step=0.3", "--no-adaptive-time-step", "--until=20"]
+    options = ["--time-step=0.3", "--penalty-constant=100", "--no-adaptive-time-step", "--until=20"]
     code, _, stderr = alsph("run", "cylinder", *small_options, *options, "-o", tmp_path / "run")
     assert code == 1
     assert "last good state" in stderr

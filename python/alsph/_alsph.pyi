@@ -71,7 +71,7 @@ class Simulation:
         """Prescribe the velocity of the inlet buffer particles, (d,) or (m, d) in the order of `inflow_position`."""
 
 def time_step_limits(settings: str, velocity_max: float) -> dict[str, float]:
-    """Stable Δt: ``penalty``, ``viscous``, ``body_force`` (inf where not applicable); and ``lambda_max``, λ_max Δx²."""
+    """Largest Δt: ``courant``, ``penalty``, ``viscous``, ``body_force`` (or inf), and ``lambda_max``: λ_max Δx²."""
 
 def instructions() -> str:
     """Name of the vector instructions in use, ``portable`` or ``avx2``; ``ALSPH_INSTRUCTIONS`` pins them."""

@@ -99,7 +99,7 @@ class Tuning:
         lines = [
             f"largest stable ΔtU/Δx: {self.largest_stable:.4g} (unstable: {self.smallest_unstable:.4g}; "
             f"the {binding.replace('_', ' ')} law says {limits[binding]:.4g})",
-            f"time_step = {case.time_step:.4g}, max_iterations = {case.max_iterations}, "
+            f"time_step = {case.largest_time_step:.4g}, max_iterations = {case.max_iterations}, "
             f"projection_sweeps = {case.projection_sweeps}: {best}",
         ]
         header = ["ΔtU/Δx", "iterations", "sweeps", "stable", "mean |∇·u| D/U", "s a unit of time"]

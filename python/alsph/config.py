@@ -64,7 +64,7 @@ class Config:
         neighbours = case.support_layers**case.space_dimensions
         iteration = 8 if case.algorithm in (1, "original") else 4
         passes = 5 + iteration * case.max_iterations + 2 * case.projection_sweeps
-        steps = self.until * case.resolution / case.time_step
+        steps = self.until * case.resolution / case.largest_time_step
         return float(case.particle_estimate() * neighbours * steps * passes)
 
     def tables(self) -> dict[str, Any]:

@@ -34,7 +34,8 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
     counts = ", ".join(f"{kinds[kind]:,} {kind.name.lower()}" for kind in Kind if kinds[kind])
     limits = case.time_step_limits()
     binding = min(limits, key=lambda name: limits[name])
-    step = min(case.time_step, case.time_step_safety * limits[binding]) if case.adaptive_time_step else case.time_step
+    step = case.expected_time_step()
+    constant = case.penalty_constant_of(step)
     steps = config.until / (step * case.particle_spacing)
     lines = [
         ("case", f"{case.name}: {case.title}"),
@@ -45,6 +46,7 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
         ("memory", f"about {np.ceil(case.memory() / 2**20):,.0f} MiB, beside Python's own"),
         *((name, f"{value:.3g}") for name, value in case.scales().items()),
         ("time step", f"ΔtU/Δx = {step:.4g}" + (" (adaptive)" if case.adaptive_time_step else "")),
+        ("penalty", f"C_BV = {constant:.3g}: artificial Mach number {constant**-0.5:.2g}"),
     ]
     for name, limit in limits.items():
         if np.isfinite(limit):

@@ -419,6 +419,7 @@ class Run:
             results["shedding periods"] = self.window.periods
         results["mean velocity divergence, |∇·u| D/U"] = self.divergence.mean
         results["largest velocity divergence, |∇·u| D/U"] = self.divergence.max
+        results["artificial Mach number of the penalty"] = Estimate(self._mach_number())
         for measure in self.measures:
             value = measure.value
             results[measure.name] = value if isinstance(value, Estimate) else Estimate(value)
@@ -426,6 +427,13 @@ class Run:
                 results[f"{measure.name}, reference"] = Estimate(measure.reference)
         results |= {f"remark {number}": remark for number, remark in enumerate(self.remarks, 1)}
         return {name: value for name, value in results.items() if value != ""}
+
+    def _mach_number(self) -> float:
+        """u_max over the penalty's speed of sound c = √(r_AL/Δt), averaged over the run."""
+        rows = (self.history.get(name, np.empty(0)) for name in ("velocity_max", "time_step", "penalty_coefficient"))
+        fastest, step, penalty = rows
+        moving = penalty > 0 if penalty.size == step.size else np.zeros(0, bool)
+        return float(np.mean(fastest[moving] * np.sqrt(step[moving] / penalty[moving]))) if moving.any() else np.nan
 
     def _iterations(self) -> str:
         """How many iterations a step took, and how many it may take, in words."""

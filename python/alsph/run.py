@@ -229,7 +229,7 @@ class _Driver:
         self.segments: list[dict[str, Any]] = info.get("segments", [])
         self.retries: list[dict[str, Any]] = info.get("retries", [])
         last = self.retries[-1] if self.retries else None
-        if last and last["step"] == simulation.step and last["time_step"] < config.case.time_step:
+        if last and last["step"] == simulation.step and last["time_step"] < config.case.largest_time_step:
             self.retries.pop()  # killed between its note and the new time step: it has not taken effect
         self.start: dict[str, Any] | None = info.get("start")  # None: an older alsph began it
         self.began = info.get("began", config.case_tables()) if self.retries else config.case_tables()
@@ -384,17 +384,18 @@ class _Driver:
             self.folder.drop_newest_checkpoint()
         saved = self.folder.read_checkpoint()
         case = self.config.case
-        taken = min(case.time_step, self.time_step / case.particle_spacing)
-        shorter = case.replace(time_step=RETRY_FACTOR * taken, time_step_safety=RETRY_FACTOR * case.time_step_safety)
+        taken = min(case.largest_time_step, self.time_step / case.particle_spacing)
+        step = RETRY_FACTOR * taken
+        shorter = case.replace(time_step=step, time_step_safety=RETRY_FACTOR * case.time_step_safety)
         config, broke_down = Config(shorter, self.config.run), self.where
         self._go_on_with(config, beginning.restored(config, saved, self.folder))
         self.rewound = True
         self.folder.truncate(self.simulation.step, self.simulation.time)
         self.retries = [retry for retry in self.retries if retry["step"] <= self.simulation.step]
-        self.retries.append({"step": self.simulation.step, "time_step": shorter.time_step, "message": message})
+        self.retries.append({"step": self.simulation.step, "time_step": step, "message": message})
         self._write_status("running")
         self.folder.write_config(config)
-        self.folder.log(f"retry: back from {broke_down} to {self.where}, with time_step = {shorter.time_step:.4g}")
+        self.folder.log(f"retry: back from {broke_down} to {self.where}, with time_step = {step:.4g}")
 
     def _write_status(self, status: str, message: str = "") -> None:
         seconds = round(clock.monotonic() - self.started, 3)

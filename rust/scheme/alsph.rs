@@ -32,8 +32,9 @@ pub struct Alsph<const D: usize> {
     /// The same of the iteration before, as (8) had it.
     divergence_pressure_before: Vec<[f64; 2]>,
     derived: Vec<Derived<D>>,
-    /// What makes it of fourth order, once a step: minus the Laplacian of [`Walls::dispersion`]. Empty at second order.
-    sharpening: Vec<Vector<D>>,
+    /// What stands beside θ ∇²u^m in the viscous term, the same in all iterations: (1 − θ) ∇²u^n, and at fourth order minus the Laplacian
+    /// of [`Walls::dispersion`]. Empty if nothing does.
+    explicit: Vec<Vector<D>>,
     /// u*.
     velocity_star: Vec<Vector<D>>,
     pressure_laplacian: Vec<f64>,
@@ -82,7 +83,7 @@ impl<const D: usize> Alsph<D> {
     ) -> Outcome {
         self.begin(particles, frame);
         self.velocity_derivatives(step, particles, frame, walls);
-        self.sharpen_laplacian(step, particles, frame, walls);
+        self.begin_viscous_term(step, particles, frame, walls);
         for iteration in 1.. {
             self.predict_velocity(step, particles, frame); // (8)
             self.update_pressure(step, particles, frame); // (10) (20)
@@ -99,7 +100,9 @@ impl<const D: usize> Alsph<D> {
             self.check_images(particles, frame, walls);
             let (divergence_max, divergence_sum) = self.divergence_norms(particles); // (13)
             let converged = divergence_max <= step.settings.divergence_tolerance;
-            if converged || iteration == step.settings.max_iterations || !divergence_max.is_finite() {
+            // The first iteration has the old velocity only in its viscous term.
+            let first_order = iteration == 1 && step.settings.viscous_theta < 1.0;
+            if (converged && !first_order) || iteration == step.settings.max_iterations || !divergence_max.is_finite() {
                 return Outcome { iterations: iteration, converged, divergence_max, divergence_sum };
             }
         }
@@ -158,18 +161,29 @@ impl<const D: usize> Alsph<D> {
         frame.images.scalars(&mut self.divergence_pressure);
     }
 
+    /// What u^n gives of the viscous term.
+    fn begin_viscous_term(&mut self, step: Step, particles: &Particles<D>, frame: &Frame<D>, walls: &mut Walls<D>) {
+        if step.settings.viscous_order == 4 {
+            self.sharpen_laplacian(step, particles, frame, walls);
+        } else {
+            self.explicit.clear();
+        }
+        let (share, derived) = (1.0 - step.settings.viscous_theta, &self.derived);
+        if share > 0.0 {
+            self.explicit.resize(particles.real, Vector::zeros());
+            parallel::for_each(&mut self.explicit, |i, explicit| *explicit += derived[i].laplacian * share);
+        }
+    }
+
     /// The error of the compact Laplacian of a wave of wave number k is `dispersion` k² of it: take it off.
     fn sharpen_laplacian(&mut self, step: Step, particles: &Particles<D>, frame: &Frame<D>, walls: &mut Walls<D>) {
-        if step.settings.viscous_order < 4 {
-            return;
-        }
         walls.sharpen(step.settings, particles, frame, |i| self.derived[i].laplacian, step.dispersion);
         let dispersion = &walls.dispersion;
         let count = particles.real;
-        frame.images.blank(&mut self.sharpening, count);
+        frame.images.blank(&mut self.explicit, count);
         frame.stencil.for_each_one(
             LaplacianAndGradient { velocity: dispersion, seen: |s: usize, _: usize| dispersion[s] },
-            &mut self.sharpening,
+            &mut self.explicit,
             |_, (laplacian, _), out| *out = -laplacian,
         );
     }
@@ -180,7 +194,8 @@ impl<const D: usize> Alsph<D> {
         let (dt, viscosity) = (step.time_step, step.settings.kinematic_viscosity);
         let paper_walls = step.settings.wall_pressure == WallPressure::Paper;
         let (initial, derived) = (&self.velocity_initial, &self.derived);
-        let sharpening = |i: usize| self.sharpening.get(i).copied().unwrap_or_else(Vector::zeros);
+        let theta = step.settings.viscous_theta;
+        let explicit = |i: usize| self.explicit.get(i).copied().unwrap_or_else(Vector::zeros);
         frame.stencil.for_each(
             GradientAndLaplacian(&self.divergence_pressure),
             frame.images.real(&mut self.velocity_star),
@@ -195,7 +210,8 @@ impl<const D: usize> Alsph<D> {
                 *star = if still {
                     initial[i]
                 } else {
-                    initial[i] + (penalty * step.penalty + (derived[i].laplacian + sharpening(i)) * viscosity + gravity) * dt
+                    initial[i]
+                        + (penalty * step.penalty + (derived[i].laplacian * theta + explicit(i)) * viscosity + gravity) * dt
                 };
             },
         );

@@ -6,11 +6,11 @@ import math
 import warnings
 from abc import abstractmethod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from alsph import remarks
 from alsph.errors import ConfigError
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 SUPPORT = {"quintic_spline": 3, "wendland_c2": 2, "wendland_c4": 2}
 """Support radius of each kernel in smoothing lengths."""
+
+PAPER = {"time_step": 0.0508, "penalty_constant": 100.0}
+"""ΔtU/Δx and C_BV of the paper, for where neither they nor a Courant number are given."""
 
 VELOCITY_LIMIT = 50.0
 """Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
@@ -51,7 +54,18 @@ class Case(Parameters):
 
     reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, ge=8, description="particles per reference length, D/Δx [-]")
-    time_step: float = Field(default=0.0508, gt=0, description="upper bound of the time step, ΔtU/Δx [-]")
+    courant: float | None = Field(
+        default=None,
+        gt=0,
+        le=1,
+        description="Courant number u_max Δt/Δx of a step, which the penalty follows, in place of time_step and "
+        "penalty_constant: 0.2 to 0.3 takes a quarter of the time (see docs/performance.md, Cost and error) [-]",
+    )
+    time_step: float | None = Field(
+        default=None,
+        gt=0,
+        description="upper bound of the time step, ΔtU/Δx; if not given courant, or without one 0.0508 [-]",
+    )
     adaptive_time_step: bool = Field(
         default=True, description="take a smaller time step where the stability law asks for it"
     )
@@ -61,7 +75,7 @@ class Case(Parameters):
         description="time from which on every step is time_step all the same; never if not given [D/U]",
     )
     time_step_safety: float = Field(
-        default=0.9, gt=0, le=1, description="fraction of the stability law's time step taken [-]"
+        default=0.9, gt=0, le=1, description="fraction of the penalty's stability law that is used [-]"
     )
     algorithm: Literal["midpoint", 1, 2, "original"] = Field(
         default="midpoint",
@@ -72,8 +86,17 @@ class Case(Parameters):
     projection_sweeps: int = Field(
         default=4, ge=0, le=1000, description="projection sweeps after the iterations of a step, 0 in the paper [-]"
     )
+    sweep_weights: Literal["chebyshev", "equal"] | None = Field(
+        default=None,
+        description="how far each sweep goes; if not given chebyshev, or equal without courant",
+    )
     tolerance: float = Field(default=1e-3, gt=0, description="largest |∇·u| at which the iterations end, ε [U/D]")
-    penalty_constant: float = Field(default=100.0, ge=1, le=100, description="penalty constant C_BV = (c/u_max)² [-]")
+    penalty_constant: float | None = Field(
+        default=None,
+        ge=1,
+        le=100,
+        description="penalty constant C_BV = (c/u_max)²; if not given what courant's step allows, without it 100 [-]",
+    )
     smoothing_ratio: float = Field(
         default=4 / 3, ge=1, le=2, description="smoothing length over particle spacing, h/Δx [-]"
     )
@@ -90,6 +113,13 @@ class Case(Parameters):
         default=4,
         description="order of the viscous term in Δx: the compact Laplacian's own, 2, or without its leading error",
     )
+    viscous_theta: float | None = Field(
+        default=None,
+        ge=0.5,
+        le=1,
+        description="weight of the new velocity in the viscous term, 1/2 of second order in time, 1 in the paper; if "
+        "not given 1/2, or 1 without courant [-]",
+    )
     shifting: Literal["xsph", "maximum_velocity", "none"] = Field(
         default="xsph", description="particle shifting: eq. (18), with β u_max in place of the XSPH velocity, or none"
     )
@@ -103,6 +133,12 @@ class Case(Parameters):
         default="linear",
         description="pressure of solid particles: eqs. (10) and (20), or that of the fluid around, constant or linear",
     )
+
+    @model_validator(mode="after")
+    def _courant_or_the_paper(self) -> Self:
+        if self.courant is not None and self.penalty_constant is not None:
+            raise ValueError("courant and penalty_constant: the penalty follows the one or the other; leave one out")
+        return self
 
     @classmethod
     def parameter_names(cls) -> list[str]:
@@ -124,6 +160,11 @@ class Case(Parameters):
     def kinematic_viscosity(self) -> float:
         """Kinematic viscosity ν [UD]."""
         return 1.0 / self.reynolds
+
+    @property
+    def largest_time_step(self) -> float:
+        """Upper bound of the time step [Δx/U]."""
+        return self.time_step or self.courant or PAPER["time_step"]
 
     @property
     def thickness(self) -> float:
@@ -259,9 +300,10 @@ class Case(Parameters):
 
     def settings(self) -> dict[str, Any]:
         """Return the engine's settings (see docs/architecture.md)."""
+        follows = self.courant is not None
         shared = (
             "smoothing_ratio kernel adaptive_time_step adaptive_until time_step_safety max_iterations "
-            "projection_sweeps penalty_constant velocity_laplacian laplacian_correction viscous_order shifting "
+            "projection_sweeps velocity_laplacian laplacian_correction viscous_order shifting "
             "shift_coefficient shift_limit wall_velocity wall_pressure"
         )
         return {name: getattr(self, name) for name in shared.split()} | {
@@ -271,7 +313,11 @@ class Case(Parameters):
             "density": 1.0,
             "kinematic_viscosity": self.kinematic_viscosity,
             "body_force": self.body_force(),
-            "time_step": self.time_step * self.particle_spacing,
+            "time_step": self.largest_time_step * self.particle_spacing,
+            "courant": self.courant,
+            "penalty_constant": self.penalty_constant or (None if follows else PAPER["penalty_constant"]),
+            "viscous_theta": self.viscous_theta or (0.5 if follows else 1.0),
+            "sweep_weights": self.sweep_weights or ("chebyshev" if follows else "equal"),
             "derivative_frame": {2: "initial", "midpoint": "midpoint"}.get(self.algorithm, "updated"),
             "search_every_iteration": self.algorithm == "original",
             "divergence_tolerance": self.tolerance,
@@ -419,20 +465,42 @@ class Case(Parameters):
         return bytes_per_particle(self.settings()) * self.particle_estimate()
 
     def time_step_limits(self) -> dict[str, float]:
-        """Return the stable ΔtU/Δx at the expected largest velocity: ``penalty``, ``viscous``, ``body_force``."""
+        """Return the bounds of ΔtU/Δx at the expected largest velocity; those that do not apply are infinite.
+
+        ``courant`` is the one asked for, ``penalty``, ``viscous`` and ``body_force`` are limits of stability.
+        """
         from alsph.simulation import time_step_limits
 
         limits = time_step_limits(self.settings(), self.velocity_max)
-        return {name: limits[name] / self.particle_spacing for name in ("penalty", "viscous", "body_force")}
+        return {name: limits[name] / self.particle_spacing for name in ("courant", "penalty", "viscous", "body_force")}
+
+    def expected_time_step(self) -> float:
+        """Return the time step at the expected largest velocity [Δx/U]."""
+        if not self.adaptive_time_step:
+            return self.largest_time_step
+        limits = self.time_step_limits()
+        limits["penalty"] *= self.time_step_safety
+        return min(self.largest_time_step, *limits.values())
+
+    def penalty_constant_of(self, time_step: float) -> float:
+        """Return C_BV = (c/u_max)² of a time step [Δx/U] at the expected u_max, c the penalty's speed of sound."""
+        from alsph.simulation import time_step_limits
+
+        if self.courant is None:
+            return self.penalty_constant or PAPER["penalty_constant"]
+        largest = time_step_limits(self.settings(), self.velocity_max)["lambda_max"]
+        return 2 / largest * (self.time_step_safety / (time_step * self.velocity_max)) ** 2
 
     def time_step_warning(self) -> str | None:
         """Return a warning if steps are to be taken above the stability law, which it names."""
         limits = self.time_step_limits()
         binding = min(limits, key=lambda name: limits[name])
-        if self.time_step <= limits[binding] or (self.adaptive_time_step and self.adaptive_until is None):
+        step = self.largest_time_step
+        if step <= limits[binding] or (self.adaptive_time_step and self.adaptive_until is None):
             return None
+        law = "courant limit" if binding == "courant" else f"{binding.replace('_', ' ')} stability limit"
         return (
-            f"time_step = {self.time_step:.4g} lies above the {binding.replace('_', ' ')} stability limit "
+            f"time_step = {step:.4g} lies above the {law} "
             f"{limits[binding]:.4g} (ΔtU/Δx at u_max = {self.velocity_max:g} U); "
             "expect divergence: lower time_step or switch adaptive_time_step on"
         )
