@@ -103,6 +103,8 @@ def test_the_penalty_follows_the_courant_number(small):
     paper = small.settings()
     assert (paper["penalty_constant"], paper["viscous_theta"], paper["sweep_weights"]) == (100.0, 1.0, "equal")
     assert paper["time_step"] == pytest.approx(0.0508 * small.particle_spacing) and paper["courant"] is None
+    assert (case.time_step, case.penalty_constant) == (None, None) and case.replace(courant=None) == small
+    assert (small.time_step, small.penalty_constant) == (0.0508, 100.0)
     with pytest.raises(ConfigError, match="courant and penalty_constant: .* leave one out"):
         small.replace(courant=0.25, penalty_constant=100.0)
     simulation = case.simulation()

@@ -41,6 +41,10 @@ the drag was that with 5.5 (docs/reliability.md)."""
 DIVERGENCE = 0.02
 """Mean |∇·u| [U/D] above which it is remarked upon; runs with the defaults have 1e-4 to 5e-3 (docs/results.md)."""
 
+COMPRESSIBLE = 0.4
+"""Largest artificial Mach number of the penalty with which results have been compared (docs/performance.md, Cost and
+error)."""
+
 FEW_PERIODS = 5
 
 
@@ -116,6 +120,15 @@ def kernel(name: str, smoothing_ratio: float) -> list[str]:
         "use smoothing_ratio = 1.75 or more, or the quintic spline"
     )
     return [f"kernel: {name} with h/Δx = {smoothing_ratio:.3g}; {found}"]
+
+
+def penalty(constant: float) -> list[str]:
+    """Remark on a penalty constant C_BV too small for a fluid that hardly gives way."""
+    mach = constant**-0.5
+    if mach <= COMPRESSIBLE:
+        return []
+    text = f"the penalty lets the fluid give way as at a Mach number of {mach:.2g}, up to {COMPRESSIBLE:g} was compared"
+    return [f"compressible: {text}; take a smaller courant, or a larger penalty_constant"]
 
 
 def channel(size: float, inlet: float, outlet: float, height: float) -> list[str]:

@@ -134,11 +134,21 @@ class Case(Parameters):
         description="pressure of solid particles: eqs. (10) and (20), or that of the fluid around, constant or linear",
     )
 
-    @model_validator(mode="after")
-    def _courant_or_the_paper(self) -> Self:
-        if self.courant is not None and self.penalty_constant is not None:
+    @model_validator(mode="before")
+    @classmethod
+    def _courant_or_the_paper(cls, values: dict[str, Any]) -> dict[str, Any]:
+        if values.get("courant") is None:
+            return values | {name: value for name, value in PAPER.items() if values.get(name) is None}
+        if values.get("penalty_constant") is not None:
             raise ValueError("courant and penalty_constant: the penalty follows the one or the other; leave one out")
-        return self
+        return values
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a case with some parameters changed; a Courant number takes the place of the paper's step."""
+        if changes.get("courant") is None:
+            return super().replace(**changes)
+        values = self.model_dump()
+        return type(self)(**{name: values[name] for name in values if values[name] != PAPER.get(name)} | changes)
 
     @classmethod
     def parameter_names(cls) -> list[str]:
@@ -164,7 +174,7 @@ class Case(Parameters):
     @property
     def largest_time_step(self) -> float:
         """Upper bound of the time step [Δx/U]."""
-        return self.time_step or self.courant or PAPER["time_step"]
+        return self.time_step or self.courant or math.nan
 
     @property
     def thickness(self) -> float:
@@ -273,6 +283,7 @@ class Case(Parameters):
             *remarks.boundary_layer(self.boundary_layer, self.particle_spacing),
             *(remarks.validated(self.reynolds, self.resolution, self.cell_reynolds, known) if known else []),
             *remarks.kernel(self.kernel, self.smoothing_ratio),
+            *remarks.penalty(self.penalty_constant_of(self.expected_time_step())),
         ]
 
     def measures(self, run: Run) -> list[Measure]:
@@ -303,7 +314,7 @@ class Case(Parameters):
         follows = self.courant is not None
         shared = (
             "smoothing_ratio kernel adaptive_time_step adaptive_until time_step_safety max_iterations "
-            "projection_sweeps velocity_laplacian laplacian_correction viscous_order shifting "
+            "projection_sweeps penalty_constant velocity_laplacian laplacian_correction viscous_order shifting "
             "shift_coefficient shift_limit wall_velocity wall_pressure"
         )
         return {name: getattr(self, name) for name in shared.split()} | {
@@ -315,7 +326,6 @@ class Case(Parameters):
             "body_force": self.body_force(),
             "time_step": self.largest_time_step * self.particle_spacing,
             "courant": self.courant,
-            "penalty_constant": self.penalty_constant or (None if follows else PAPER["penalty_constant"]),
             "viscous_theta": self.viscous_theta or (0.5 if follows else 1.0),
             "sweep_weights": self.sweep_weights or ("chebyshev" if follows else "equal"),
             "derivative_frame": {2: "initial", "midpoint": "midpoint"}.get(self.algorithm, "updated"),
@@ -486,8 +496,8 @@ class Case(Parameters):
         """Return C_BV = (c/u_max)² of a time step [Δx/U] at the expected u_max, c the penalty's speed of sound."""
         from alsph.simulation import time_step_limits
 
-        if self.courant is None:
-            return self.penalty_constant or PAPER["penalty_constant"]
+        if self.penalty_constant is not None:
+            return self.penalty_constant
         largest = time_step_limits(self.settings(), self.velocity_max)["lambda_max"]
         return 2 / largest * (self.time_step_safety / (time_step * self.velocity_max)) ** 2
 
