@@ -288,11 +288,11 @@ impl Settings {
     pub fn time_step_limits(&self, velocity_max: f64, largest_eigenvalue: f64) -> TimeStepLimits {
         let gravity = self.body_force.iter().map(|g| g * g).sum::<f64>().sqrt();
         let h = self.smoothing_length();
-        let crossing = self.particle_spacing / velocity_max;
-        let stable = |constant: f64| crossing / (constant * largest_eigenvalue / 2.0).sqrt();
+        let spacing = self.particle_spacing;
+        let wave = |constant: f64| velocity_max * (constant * largest_eigenvalue / 2.0).sqrt();
         TimeStepLimits {
-            courant: self.courant.map_or(f64::INFINITY, |courant| courant * crossing),
-            penalty: self.penalty_constant.map_or(f64::INFINITY, stable),
+            courant: self.courant.map_or(f64::INFINITY, |courant| courant * spacing / velocity_max),
+            penalty: self.penalty_constant.map_or(f64::INFINITY, |constant| spacing / wave(constant)),
             viscous: self.viscous_limit() * h * h / self.kinematic_viscosity,
             body_force: 0.25 * (h / gravity).sqrt(),
         }
