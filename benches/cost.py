@@ -55,7 +55,7 @@ def row(case: str, resolution: int, text: str, until: float, parameters: dict[st
         for measure in run.measures:
             value = measure.value
             error = f"{100 * measure.error:+.3g} %" if np.isfinite(measure.reference) else f"{value:.4g}"
-            cells[measure.name.split(",")[0]] = error + (f" (± {value.uncertainty:.2g})" if spread(value) else "")
+            cells[measure.name] = error + (f" (± {value.uncertainty:.2g})" if spread(value) else "")
         if made.coefficient_bodies:
             cells["noise of C_L"] = f"{noise(run, 'lift_coefficient'):.2g}"
     return cells
