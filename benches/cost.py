@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from alsph import analysis
+from alsph.analysis import Estimate
 from alsph.cases import CASES
 from alsph.results import Run
 from alsph.tables import markdown
@@ -53,17 +53,12 @@ def row(case: str, resolution: int, text: str, until: float, parameters: dict[st
         cells["ΔtU/Δx"] = f"{np.mean(run.history['time_step']) * resolution:.3g}"
         cells["mean |∇·u|"] = f"{run.divergence.mean:.2e}"
         for measure in run.measures:
-            value = measure.value
-            error = f"{100 * measure.error:+.3g} %" if np.isfinite(measure.reference) else f"{value:.4g}"
-            cells[measure.name] = error + (f" (± {value.uncertainty:.2g})" if spread(value) else "")
+            value = measure.value if isinstance(measure.value, Estimate) else Estimate(measure.value)
+            known = np.isfinite(measure.reference)
+            cells[measure.name] = f"{value}" + (f", {100 * measure.error:+.3g} %" if known else "")
         if made.coefficient_bodies:
             cells["noise of C_L"] = f"{noise(run, 'lift_coefficient'):.2g}"
     return cells
-
-
-def spread(value: float) -> bool:
-    """Return whether a value has a ±."""
-    return isinstance(value, analysis.Estimate) and bool(np.isfinite(value.uncertainty))
 
 
 def main() -> None:

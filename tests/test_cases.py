@@ -94,14 +94,10 @@ def test_algorithms(algorithm, frame, search):
 def test_the_penalty_follows_the_courant_number(small):
     case = small.replace(courant=0.25)
     assert case.largest_time_step == 0.25 and case.expected_time_step() == pytest.approx(0.25 / 1.5)
-    settings = case.settings()
-    assert (settings["penalty_constant"], settings["viscous_theta"], settings["sweep_weights"]) == (
-        None,
-        0.5,
-        "chebyshev",
-    )
-    paper = small.settings()
-    assert (paper["penalty_constant"], paper["viscous_theta"], paper["sweep_weights"]) == (100.0, 1.0, "equal")
+    settings, paper = case.settings(), small.settings()
+    names = ("penalty_constant", "viscous_theta", "sweep_weights")
+    assert [settings[name] for name in names] == [None, 0.5, "chebyshev"]
+    assert [paper[name] for name in names] == [100.0, 1.0, "equal"]
     assert paper["time_step"] == pytest.approx(0.0508 * small.particle_spacing) and paper["courant"] is None
     assert (case.time_step, case.penalty_constant) == (None, None) and case.replace(courant=None) == small
     assert (small.time_step, small.penalty_constant) == (0.0508, 100.0)
@@ -116,7 +112,7 @@ def test_the_penalty_follows_the_courant_number(small):
     relaxed = history["penalty_coefficient"] * history["time_step"] * largest / spacing**2
     assert relaxed == pytest.approx(2 * 0.9**2)
     constant = history["penalty_coefficient"] / history["time_step"] / history["velocity_max"] ** 2
-    assert constant == pytest.approx(case.penalty_constant_of(case.expected_time_step()))
+    assert constant == pytest.approx(case.expected_penalty_constant())
 
 
 def test_time_step_warning_names_the_limit():

@@ -34,8 +34,7 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
     counts = ", ".join(f"{kinds[kind]:,} {kind.name.lower()}" for kind in Kind if kinds[kind])
     limits = case.time_step_limits()
     binding = min(limits, key=lambda name: limits[name])
-    step = case.expected_time_step()
-    constant = case.penalty_constant_of(step)
+    step, constant = case.expected_time_step(), case.expected_penalty_constant()
     steps = config.until / (step * case.particle_spacing)
     lines = [
         ("case", f"{case.name}: {case.title}"),

@@ -430,9 +430,11 @@ class Run:
 
     def _mach_number(self) -> float:
         """u_max over the penalty's speed of sound c = √(r_AL/Δt), averaged over the run."""
-        rows = (self.history.get(name, np.empty(0)) for name in ("velocity_max", "time_step", "penalty_coefficient"))
-        fastest, step, penalty = rows
-        moving = penalty > 0 if penalty.size == step.size else np.zeros(0, bool)
+        names = ("velocity_max", "time_step", "penalty_coefficient")
+        if not all(name in self.history for name in names):
+            return np.nan
+        fastest, step, penalty = (self.history[name] for name in names)
+        moving = penalty > 0
         return float(np.mean(fastest[moving] * np.sqrt(step[moving] / penalty[moving]))) if moving.any() else np.nan
 
     def _iterations(self) -> str:

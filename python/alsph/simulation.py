@@ -31,7 +31,7 @@ def bytes_per_particle(settings: dict[str, Any]) -> float:
 
 
 def time_step_limits(settings: dict[str, Any], velocity_max: float) -> dict[str, float]:
-    """Return the stable time steps ``penalty``, ``viscous``, ``body_force`` [D/U], and ``lambda_max`` (λ_max Δx²)."""
+    """Return the largest steps by ``courant``, ``penalty``, ``viscous``, ``body_force`` [D/U], and ``lambda_max``."""
     with _translated():
         return _alsph.time_step_limits(json.dumps(settings), velocity_max)
 

@@ -283,7 +283,7 @@ class Case(Parameters):
             *remarks.boundary_layer(self.boundary_layer, self.particle_spacing),
             *(remarks.validated(self.reynolds, self.resolution, self.cell_reynolds, known) if known else []),
             *remarks.kernel(self.kernel, self.smoothing_ratio),
-            *remarks.penalty(self.penalty_constant_of(self.expected_time_step())),
+            *remarks.penalty(self.expected_penalty_constant()),
         ]
 
     def measures(self, run: Run) -> list[Measure]:
@@ -492,14 +492,14 @@ class Case(Parameters):
         limits["penalty"] *= self.time_step_safety
         return min(self.largest_time_step, *limits.values())
 
-    def penalty_constant_of(self, time_step: float) -> float:
-        """Return C_BV = (c/u_max)² of a time step [Δx/U] at the expected u_max, c the penalty's speed of sound."""
+    def expected_penalty_constant(self) -> float:
+        """Return C_BV = (c/u_max)² at the expected largest velocity, c the penalty's speed of sound."""
         from alsph.simulation import time_step_limits
 
         if self.penalty_constant is not None:
             return self.penalty_constant
         largest = time_step_limits(self.settings(), self.velocity_max)["lambda_max"]
-        return 2 / largest * (self.time_step_safety / (time_step * self.velocity_max)) ** 2
+        return 2 / largest * (self.time_step_safety / (self.expected_time_step() * self.velocity_max)) ** 2
 
     def time_step_warning(self) -> str | None:
         """Return a warning if steps are to be taken above the stability law, which it names."""
