@@ -41,15 +41,8 @@ pub struct Report<const D: usize> {
 }
 
 impl<const D: usize> Report<D> {
-    /// The report of a step whose iteration has ended and whose particles have not yet been shifted.
-    pub fn new(
-        step: Step,
-        outcome: Outcome,
-        particles: &Particles<D>,
-        volume: &[f64],
-        velocity_max: f64,
-        loads: Vec<Load<D>>,
-    ) -> Self {
+    /// The report of a step whose iteration has ended and whose particles have not yet been shifted; clock, counts and outcome come after.
+    pub fn new(step: Step, particles: &Particles<D>, volume: &[f64], velocity_max: f64, loads: Vec<Load<D>>) -> Self {
         let sums = |range: std::ops::Range<usize>| {
             range
                 .filter(|&i| particles.kind[i] == ParticleKind::Fluid)
@@ -59,7 +52,7 @@ impl<const D: usize> Report<D> {
         Self {
             clock: Clock::default(),
             time_step: step.time_step,
-            outcome,
+            outcome: Outcome::default(),
             velocity_max,
             penalty: step.penalty,
             fluid: particles.counts()[ParticleKind::Fluid as usize],

@@ -2,7 +2,7 @@
 
 use crate::error::{Result, setting};
 use crate::kernel::{KernelKind, Smoothing};
-use crate::particles::Vector;
+use crate::particles::{Matrix, Vector};
 use crate::with_kernel;
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +22,14 @@ impl DerivativeFrame {
     /// How far of the way u^n Δt the frame lies before the iteration.
     pub fn fraction(self) -> f64 {
         if self == Self::Midpoint { 0.5 } else { 0.0 }
+    }
+
+    /// The ∇·u that a u^{n+1} of this ∇u, solenoidal once the particles have moved, has in the frame: in the middle of the step, half a
+    /// step before r^{n+1}, it is ½Δt tr (∇u)². Zero in the paper's algorithms.
+    #[inline(always)]
+    pub fn solenoidal_divergence<const D: usize>(self, gradient: &Matrix<D>, time_step: f64) -> f64 {
+        let lead = self.fraction() * time_step;
+        if lead > 0.0 { lead * (gradient * gradient).trace() } else { 0.0 }
     }
 }
 
@@ -142,7 +150,7 @@ pub struct Settings {
     /// Speed that no particle reaches unless the computation has gone wrong; none if not given.
     #[serde(default)]
     pub velocity_limit: Option<f64>,
-    /// Fraction of the penalty's stability law that is used: by an adaptive step for a given C_BV, else by r_AL for a given step.
+    /// Fraction of the penalty's stability law that an adaptive step uses for a given C_BV.
     pub time_step_safety: f64,
     pub derivative_frame: DerivativeFrame,
     /// Search the neighbours again in every iteration (Fatehi et al. 2019). Only with the updated frame.
@@ -154,7 +162,7 @@ pub struct Settings {
     pub sweep_weights: SweepWeights,
     /// ε of (13), 1/time.
     pub divergence_tolerance: f64,
-    /// C_BV, as in the paper; if not given r_AL Δt λ_max is that of the stability law, whatever the step.
+    /// C_BV, as in the paper; if not given r_AL Δt λ_max is 1, whatever the step.
     #[serde(default)]
     pub penalty_constant: Option<f64>,
     /// Weight of the ∇²u of the new velocity in the viscous term, the rest being that of the old: 1 in (8), ½ of second order in time.
@@ -298,11 +306,12 @@ impl Settings {
         }
     }
 
-    /// r_AL of a step: C_BV u_max² Δt, or what takes r_AL Δt λ_max to the share of the stability law that the safety allows.
+    /// r_AL of a step: C_BV u_max² Δt, or half of what the stability law allows, r_AL Δt λ_max = 1: then an iteration takes off all that
+    /// the Laplacian's shortest waves have of ∇·u, and less of longer ones.
     pub fn penalty(&self, velocity_max: f64, time_step: f64, largest_eigenvalue: f64) -> f64 {
         match self.penalty_constant {
             Some(constant) => constant * velocity_max * velocity_max * time_step,
-            None => 2.0 * (self.time_step_safety * self.particle_spacing).powi(2) / (largest_eigenvalue * time_step),
+            None => self.particle_spacing.powi(2) / (largest_eigenvalue * time_step),
         }
     }
 

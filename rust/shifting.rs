@@ -8,7 +8,7 @@ use crate::neighbours::{Cluster, Row, Visit};
 use crate::operators::Neighbours;
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
-use crate::settings::{Settings, Shifting};
+use crate::settings::{DerivativeFrame, Settings, Shifting};
 use crate::stencil::{Corrected, Stencil};
 use crate::with_kernel;
 
@@ -32,9 +32,14 @@ pub fn shift<const D: usize>(
     let displacements = if frame.faces.is_empty() { displacements::<D, false> } else { displacements::<D, true> };
     displacements(settings, particles, frame, walls, [time_step, velocity_max], change);
     let images = &frame.images;
-    parallel::for_each(images.real(&mut particles.position), |i, r| *r += change[i].0);
-    parallel::for_each(images.real(&mut particles.velocity), |i, u| *u += change[i].1);
-    parallel::for_each(images.real(&mut particles.pressure), |i, p| *p += change[i].2);
+    parallel::for_each(images.real(&mut particles.position), |i, r| *r += change[i].position);
+    parallel::for_each(images.real(&mut particles.velocity), |i, u| *u += change[i].velocity);
+    parallel::for_each(images.real(&mut particles.pressure), |i, p| *p += change[i].pressure);
+}
+
+/// Whether the derivatives of the shift are those of u^{n+1} in the frame of the step: then the last iteration need not take them too.
+pub fn measures_divergence(settings: &Settings) -> bool {
+    settings.shifting != Shifting::None && settings.derivative_frame != DerivativeFrame::Updated
 }
 
 /// The change of every particle; where there are faces (`SHARED`) neighbours count by the shares that are seen of them.
@@ -54,11 +59,22 @@ fn displacements<const D: usize, const SHARED: bool>(
     });
 }
 
-/// δr, δr·∇u and δr·∇p.
-pub type Change<const D: usize> = (Vector<D>, Vector<D>, f64);
+/// What the shift changes of a fluid particle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Change<const D: usize> {
+    /// δr.
+    position: Vector<D>,
+    /// δr·∇u.
+    velocity: Vector<D>,
+    /// δr·∇p.
+    pressure: f64,
+    /// ∇·u before the shift, less [`DerivativeFrame::solenoidal_divergence`].
+    pub divergence: f64,
+}
 
 impl<const D: usize> Poison for Change<D> {
-    const POISON: Self = (Poison::POISON, Poison::POISON, Poison::POISON);
+    const POISON: Self =
+        Self { position: Poison::POISON, velocity: Poison::POISON, pressure: Poison::POISON, divergence: Poison::POISON };
 }
 
 /// Displacement of every particle if it were fluid.
@@ -81,6 +97,8 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Visit<Change<D>, ()> for Dis
         let Particles { velocity, pressure, kind, .. } = self.particles;
         let (u, p): ([V; D], V) = (cluster.vectors(velocity), cluster.lanes(|i| pressure[i]));
         let (mut velocity_gradient, mut pressure_gradient) = ([[V::zero(); D]; D], [V::zero(); D]);
+        // What ∇·u has of solids beside ∇u: it takes their own velocity, not what they show.
+        let mut hidden = [[V::zero(); D]; D];
         let Stencil { position, correction, .. } = self.stencil;
         let mut near = Corrected { cluster, row, position, correction };
         near.for_each_flowing(
@@ -97,16 +115,19 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Visit<Change<D>, ()> for Dis
             |s, slope: V, r_ij| {
                 let seen = cluster.particles().map(|i| self.walls.seen_by(self.particles, s, i));
                 for k in 0..D {
-                    add_product(&mut velocity_gradient[k], (V::load(&seen.map(|u| u[k])) - u[k]) * slope, r_ij);
+                    let (seen, own) = (V::load(&seen.map(|u| u[k])), V::splat(velocity[s][k]));
+                    add_product(&mut velocity_gradient[k], (seen - u[k]) * slope, r_ij);
+                    add_product(&mut hidden[k], (own - seen) * slope, r_ij);
                 }
                 add_product(&mut pressure_gradient, (V::splat(pressure[s]) - p) * slope, r_ij);
             },
         );
-        let (velocity_gradient, pressure_gradient) = (matrices(velocity_gradient), vectors(pressure_gradient));
+        let (velocity_gradient, hidden, pressure_gradient) =
+            (matrices(velocity_gradient), matrices(hidden), vectors(pressure_gradient));
         for (lane, out) in out.iter_mut().enumerate() {
             let i = cluster.first + lane;
             if kind[i] != ParticleKind::Fluid {
-                *out = (Vector::zeros(), Vector::zeros(), 0.0);
+                *out = Change { position: Vector::zeros(), velocity: Vector::zeros(), pressure: 0.0, divergence: 0.0 };
                 continue;
             }
             // The particle itself is in the list: it is counted, and adds next to nothing to the other sums.
@@ -115,7 +136,14 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Visit<Change<D>, ()> for Dis
             let relative_speed = relative[lane].norm() / total[lane];
             let shift = self.limited(asymmetry[lane], mean_distance, relative_speed);
             let carried = correction[i].inverse * shift;
-            *out = (shift, velocity_gradient[lane] * carried, pressure_gradient[lane].dot(&carried));
+            let gradient = (velocity_gradient[lane] + hidden[lane]) * correction[i].inverse;
+            let solenoidal = self.settings.derivative_frame.solenoidal_divergence(&gradient, self.time_step);
+            *out = Change {
+                position: shift,
+                velocity: velocity_gradient[lane] * carried,
+                pressure: pressure_gradient[lane].dot(&carried),
+                divergence: gradient.trace() - solenoidal,
+            };
         }
     }
 }

@@ -12,9 +12,9 @@ use crate::operators::VelocityGradient;
 use crate::parallel;
 use crate::particles::{Matrix, ParticleKind, Particles, Vector};
 use crate::report::{Clock, Report};
-use crate::scheme::{self, Alsph, Step};
+use crate::scheme::{self, Alsph, Outcome, Step};
 use crate::settings::{Boundary, Settings};
-use crate::shifting::{Change, shift};
+use crate::shifting::{Change, measures_divergence, shift};
 use rayon::ThreadPool;
 use std::ops::Range;
 use std::sync::Arc;
@@ -146,7 +146,7 @@ impl<const D: usize> Simulation<D> {
         let (relaxation, dispersion) = (self.relaxation, self.dispersion);
         let step = Step { settings: &self.settings, time_step, penalty, relaxation, dispersion };
 
-        let outcome = self.scheme.iterate(step, &mut self.particles, &mut self.frame, &mut self.walls);
+        let iterations = self.scheme.iterate(step, &mut self.particles, &mut self.frame, &mut self.walls);
         if let Some(symptom) = breakdown::find(step.settings, &self.particles, &self.frame, time_step) {
             let error = self.diverged(symptom, time_step, velocity_max);
             self.restore_initial();
@@ -154,10 +154,13 @@ impl<const D: usize> Simulation<D> {
         }
         let acting = |i: usize| self.scheme.acting_pressure(step, &self.particles, i);
         let loads = loads(step.settings, &self.particles, &self.frame, &self.walls, acting);
-        let mut report = Report::new(step, outcome, &self.particles, &self.frame.stencil.volume, velocity_max, loads);
+        let mut report = Report::new(step, &self.particles, &self.frame.stencil.volume, velocity_max, loads);
         self.scheme.advance_positions(step, &mut self.particles, &self.frame); // (12)
         self.walls.see_for_shift(step.settings, &self.particles, &self.frame);
         shift(step.settings, &mut self.particles, &self.frame, &self.walls, time_step, velocity_max, &mut self.change); // (18) (19)
+        let measured = measures_divergence(step.settings);
+        let divergence = |i: usize| if measured { self.change[i].divergence } else { self.scheme.divergence(i) };
+        report.outcome = Outcome::new(step.settings, &self.particles, iterations, divergence);
         self.end_step(time_step);
         report.clock = self.clock;
         report.counts = self.particles.counts();

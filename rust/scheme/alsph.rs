@@ -7,6 +7,7 @@ use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::scheme::projection::Projection;
 use crate::settings::{DerivativeFrame, Settings, VelocityLaplacian, WallPressure};
+use crate::shifting::measures_divergence;
 
 /// How a step ended.
 #[derive(Clone, Copy, Debug, Default)]
@@ -18,6 +19,29 @@ pub struct Outcome {
     pub divergence_max: f64,
     /// Σ |∇·u| over the fluid.
     pub divergence_sum: f64,
+}
+
+impl Outcome {
+    /// That of so many iterations which left this ∇·u, less [`Derived::solenoidal`].
+    pub fn new<const D: usize>(
+        settings: &Settings,
+        particles: &Particles<D>,
+        iterations: usize,
+        divergence: impl Fn(usize) -> f64 + Sync,
+    ) -> Self {
+        let norms = |range: std::ops::Range<usize>| {
+            range.filter(|&i| particles.kind[i] == ParticleKind::Fluid).fold((0.0, 0.0), |(max, sum): (f64, f64), i| {
+                let value = divergence(i).abs();
+                // NaN must not hide behind max, which drops it.
+                (if value > max || value.is_nan() { value } else { max }, sum + value)
+            })
+        };
+        let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
+        let (divergence_max, divergence_sum) =
+            parallel::reduce(particles.real, norms, |a, b| (larger(a.0, b.0), a.1 + b.1)).unwrap_or_default();
+        let converged = divergence_max <= settings.divergence_tolerance;
+        Self { iterations, converged, divergence_max, divergence_sum }
+    }
 }
 
 /// The fields of one step beside those of the particles, real particles and images.
@@ -48,8 +72,7 @@ pub struct Alsph<const D: usize> {
 pub struct Derived<const D: usize> {
     /// ∇²u^m.
     pub laplacian: Vector<D>,
-    /// The ∇·u that a solenoidal u^{n+1} has in the frame of the derivatives: in the middle of the step, half a step before r^{n+1},
-    /// it is ½Δt tr (∇u)². Zero in the paper's algorithms.
+    /// [`DerivativeFrame::solenoidal_divergence`].
     pub solenoidal: f64,
 }
 
@@ -73,14 +96,15 @@ pub struct Step<'a> {
 
 impl<const D: usize> Alsph<D> {
     /// Advance velocity and pressure to n+1 and leave `particles.position` at the frame of the last derivatives; see
-    /// [`Alsph::advance_positions`]. `frame` holds the stencil at r^n, or in the middle of the step.
+    /// [`Alsph::advance_positions`]. `frame` holds the stencil at r^n, or in the middle of the step. Returns the number of iterations;
+    /// what they leave of ∇·u is found with the shift where that can ([`measures_divergence`]), else by [`Alsph::divergence`].
     pub fn iterate(
         &mut self,
         step: Step,
         particles: &mut Particles<D>,
         frame: &mut Frame<D>,
         walls: &mut Walls<D>,
-    ) -> Outcome {
+    ) -> usize {
         self.begin(particles, frame);
         self.velocity_derivatives(step, particles, frame, walls);
         self.begin_viscous_term(step, particles, frame, walls);
@@ -96,14 +120,18 @@ impl<const D: usize> Alsph<D> {
                 frame.update(step.settings, particles);
             }
             std::mem::swap(&mut self.divergence_pressure, &mut self.divergence_pressure_before);
+            let last = iteration == step.settings.max_iterations;
+            if last && measures_divergence(step.settings) {
+                walls.see(step.settings, particles, frame); // for the loads
+                return iteration;
+            }
             self.velocity_derivatives(step, particles, frame, walls);
             self.check_images(particles, frame, walls);
-            let (divergence_max, divergence_sum) = self.divergence_norms(particles); // (13)
-            let converged = divergence_max <= step.settings.divergence_tolerance;
+            let outcome = Outcome::new(step.settings, particles, iteration, |i| self.divergence(i)); // (13)
             // The first iteration has the old velocity only in its viscous term.
             let first_order = iteration == 1 && step.settings.viscous_theta < 1.0;
-            if (converged && !first_order) || iteration == step.settings.max_iterations || !divergence_max.is_finite() {
-                return Outcome { iterations: iteration, converged, divergence_max, divergence_sum };
+            if (outcome.converged && !first_order) || last || !outcome.divergence_max.is_finite() {
+                return iteration;
             }
         }
         unreachable!("the loop ends at its cap")
@@ -116,8 +144,8 @@ impl<const D: usize> Alsph<D> {
         particles.pressure[i] + penalty + self.projection.unkept(particles, i)
     }
 
-    /// ∇·u of the last iteration.
-    fn divergence(&self, i: usize) -> f64 {
+    /// ∇·u of the last derivatives, less [`Derived::solenoidal`].
+    pub fn divergence(&self, i: usize) -> f64 {
         self.divergence_pressure[i][0]
     }
 
@@ -142,13 +170,12 @@ impl<const D: usize> Alsph<D> {
         let (velocity, pressure) = (&particles.velocity, &particles.pressure);
         let walls = &*walls;
         let seen = |s, i| walls.seen_by(particles, s, i);
-        let lead = step.settings.derivative_frame.fraction() * step.time_step;
         frame.stencil.correct_and_for_each(
             LaplacianAndGradient { velocity, seen },
             frame.images.real(&mut self.divergence_pressure),
             &mut self.derived,
             |i, (laplacian, gradient), out, derived| {
-                let solenoidal = if lead > 0.0 { lead * (gradient * gradient).trace() } else { 0.0 };
+                let solenoidal = step.settings.derivative_frame.solenoidal_divergence(&gradient, step.time_step);
                 *out = [gradient.trace() - solenoidal, pressure[i]];
                 *derived = Derived { laplacian, solenoidal };
             },
@@ -305,19 +332,6 @@ impl<const D: usize> Alsph<D> {
             images.check(field, |_, value| value);
         }
         images.check(&self.divergence_pressure, |_, value| value);
-    }
-
-    /// max and Σ of |∇·u| over the fluid.
-    fn divergence_norms(&self, particles: &Particles<D>) -> (f64, f64) {
-        let norms = |range: std::ops::Range<usize>| {
-            range.filter(|&i| particles.kind[i] == ParticleKind::Fluid).fold((0.0, 0.0), |(max, sum): (f64, f64), i| {
-                let value = self.divergence(i).abs();
-                // NaN must not hide behind max, which drops it.
-                (if value > max || value.is_nan() { value } else { max }, sum + value)
-            })
-        };
-        let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
-        parallel::reduce(particles.real, norms, |a, b| (larger(a.0, b.0), a.1 + b.1)).unwrap_or_default()
     }
 }
 
