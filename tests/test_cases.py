@@ -75,9 +75,9 @@ def test_initial_vortex_is_divergence_free_and_can_be_left_out():
 @pytest.mark.parametrize("model", CASES.values())
 def test_engine_accepts_the_settings_and_the_estimate_is_close(model):
     case = model()
-    limits = _alsph.time_step_limits(json.dumps(case.settings()), 1.0)
+    limits = _alsph.time_step_limits(json.dumps(case.replace(penalty_constant=100.0).settings()), 1.0)
     assert 0.09 < limits["penalty"] / case.particle_spacing < 0.1 and limits["courant"] == np.inf
-    limits = _alsph.time_step_limits(json.dumps(case.replace(courant=0.3).settings()), 1.0)
+    limits = _alsph.time_step_limits(json.dumps(case.settings()), 1.0)
     assert limits["courant"] / case.particle_spacing == pytest.approx(0.3) and limits["penalty"] == np.inf
     assert case.particle_estimate() == pytest.approx(len(case.particles()["kind"]), rel=0.02)
 
@@ -91,26 +91,46 @@ def test_algorithms(algorithm, frame, search):
     assert settings["search_every_iteration"] is search
 
 
+def test_the_courant_number_and_the_pair_of_the_paper_take_the_place_of_one_another(small):
+    def given(case):
+        return case.courant, case.time_step, case.penalty_constant
+
+    def engine(case):
+        return [case.settings()[name] for name in ("courant", "penalty_constant", "viscous_theta", "sweep_weights")]
+
+    assert given(small) == given(small.replace(courant=None)) == (0.3, None, None)
+    assert engine(small) == [0.3, None, 0.5, "chebyshev"]
+    paper = small.replace(penalty_constant=80.0)
+    assert given(paper) == given(Cylinder(penalty_constant=80.0)) == (None, 0.0508, 80.0)
+    assert engine(paper) == [None, 80.0, 1.0, "equal"]
+    assert paper.settings()["time_step"] == pytest.approx(0.0508 * small.particle_spacing)
+    assert given(small.replace(time_step=0.04)) == given(Cylinder(time_step=0.04)) == (None, 0.04, 100.0)
+    assert given(paper.replace(courant=0.2)) == (0.2, None, None)
+    assert given(paper.replace(reynolds=50)) == given(paper) and given(small.replace(reynolds=50)) == given(small)
+    assert given(paper.replace(courant=0.2, time_step=0.1)) == (0.2, 0.1, None)
+    for case in (small, paper):
+        with pytest.raises(ConfigError, match="courant and penalty_constant: .* leave one out"):
+            case.replace(courant=0.25, penalty_constant=100.0)
+
+
+def test_steps_that_are_not_adaptive_have_the_courant_number_at_the_expected_velocity(small):
+    assert small.replace(adaptive_time_step=False).largest_time_step == pytest.approx(0.3 / 1.5)
+    assert small.replace(adaptive_time_step=False).time_step_warning() is None
+    assert small.largest_time_step == 0.3
+
+
 def test_the_penalty_follows_the_courant_number(small):
     case = small.replace(courant=0.25)
     assert case.largest_time_step == 0.25 and case.expected_time_step() == pytest.approx(0.25 / 1.5)
-    settings, paper = case.settings(), small.settings()
-    names = ("penalty_constant", "viscous_theta", "sweep_weights")
-    assert [settings[name] for name in names] == [None, 0.5, "chebyshev"]
-    assert [paper[name] for name in names] == [100.0, 1.0, "equal"]
-    assert paper["time_step"] == pytest.approx(0.0508 * small.particle_spacing) and paper["courant"] is None
-    assert (case.time_step, case.penalty_constant) == (None, None) and case.replace(courant=None) == small
-    assert (small.time_step, small.penalty_constant) == (0.0508, 100.0)
-    with pytest.raises(ConfigError, match="courant and penalty_constant: .* leave one out"):
-        small.replace(courant=0.25, penalty_constant=100.0)
+    settings = case.settings()
     simulation = case.simulation()
     simulation.advance(4)
     history, spacing = simulation.history(), case.particle_spacing
     assert history["velocity_max"] * history["time_step"] == pytest.approx(0.25 * spacing)
-    # r_AL Δt λ_max/Δx² is 2 · 0.9², and c² = r_AL/Δt = C_BV u_max².
+    # r_AL Δt λ_max/Δx² is 1, and c² = r_AL/Δt = C_BV u_max².
     largest = _alsph.time_step_limits(json.dumps(settings), 1.0)["lambda_max"]
     relaxed = history["penalty_coefficient"] * history["time_step"] * largest / spacing**2
-    assert relaxed == pytest.approx(2 * 0.9**2)
+    assert relaxed == pytest.approx(1.0)
     constant = history["penalty_coefficient"] / history["time_step"] / history["velocity_max"] ** 2
     assert constant == pytest.approx(case.expected_penalty_constant())
 

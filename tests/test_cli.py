@@ -88,7 +88,7 @@ def test_describe(alsph, small_options):
         "solid",
         "MiB",
         "Mach number",
-        "penalty limit",
+        "courant limit",
         "(binds)",
         "viscous limit",
         "Reynolds number",

@@ -179,6 +179,7 @@ def autotune(
     good = [found for found in tried if found.divergence <= divergence]
     best = min(good, key=lambda found: found.cost) if good else min(tried, key=lambda found: found.divergence)
     tuned = case.replace(
+        courant=case.courant and max(case.courant, best.time_step * tuner.velocity_max),
         time_step=best.time_step,
         max_iterations=best.max_iterations,
         projection_sweeps=best.projection_sweeps,
@@ -238,7 +239,8 @@ class _Tuner:
                     break
 
     def _probe(self, step: float, iterations: int | None = None, sweeps: int | None = None) -> Probe:
-        changes: dict[str, Any] = {"time_step": step, "adaptive_time_step": False, "adaptive_until": None}
+        fixed = {"adaptive_time_step": False, "adaptive_until": None}
+        changes: dict[str, Any] = {"courant": self.case.courant, "time_step": step} | fixed
         if iterations is not None:
             changes |= {"max_iterations": iterations, "projection_sweeps": sweeps}
         case = self.case.replace(**changes)

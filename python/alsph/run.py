@@ -386,7 +386,8 @@ class _Driver:
         case = self.config.case
         taken = min(case.largest_time_step, self.time_step / case.particle_spacing)
         step = RETRY_FACTOR * taken
-        shorter = case.replace(time_step=step, time_step_safety=RETRY_FACTOR * case.time_step_safety)
+        bound = "courant" if case.courant else "time_step_safety"
+        shorter = case.replace(**{"time_step": step, bound: RETRY_FACTOR * getattr(case, bound)})
         config, broke_down = Config(shorter, self.config.run), self.where
         self._go_on_with(config, beginning.restored(config, saved, self.folder))
         self.rewound = True

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from abc import abstractmethod
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
@@ -27,11 +28,20 @@ if TYPE_CHECKING:
 SUPPORT = {"quintic_spline": 3, "wendland_c2": 2, "wendland_c4": 2}
 """Support radius of each kernel in smoothing lengths."""
 
+COURANT = 0.3
+"""Courant number where neither it nor the paper's pair is given."""
+
 PAPER = {"time_step": 0.0508, "penalty_constant": 100.0}
-"""ΔtU/Δx and C_BV of the paper, for where neither they nor a Courant number are given."""
+"""ΔtU/Δx and C_BV where only one of them is given."""
 
 VELOCITY_LIMIT = 50.0
 """Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
+
+
+def superseded(changes: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the parameters whose place others take: a Courant number that of the paper's pair, either of those its."""
+    given = {name for name in ("courant", *PAPER) if changes.get(name) is not None}
+    return tuple(PAPER) if "courant" in given else ("courant",) if given else ()
 
 
 class Case(Parameters):
@@ -58,13 +68,14 @@ class Case(Parameters):
         default=None,
         gt=0,
         le=1,
-        description="Courant number u_max Δt/Δx of a step, which the penalty follows, in place of time_step and "
-        "penalty_constant: 0.2 to 0.3 takes a quarter of the time (see docs/performance.md, Cost and error) [-]",
+        description="Courant number u_max Δt/Δx of a step, which the penalty follows; if not given 0.3, or none where "
+        "time_step or penalty_constant are given as in the paper [-]",
     )
     time_step: float | None = Field(
         default=None,
         gt=0,
-        description="upper bound of the time step, ΔtU/Δx; if not given courant, or without one 0.0508 [-]",
+        description="upper bound of the time step, ΔtU/Δx; if not given none but courant's, or 0.0508 beside a "
+        "penalty_constant [-]",
     )
     adaptive_time_step: bool = Field(
         default=True, description="take a smaller time step where the stability law asks for it"
@@ -75,7 +86,10 @@ class Case(Parameters):
         description="time from which on every step is time_step all the same; never if not given [D/U]",
     )
     time_step_safety: float = Field(
-        default=0.9, gt=0, le=1, description="fraction of the penalty's stability law that is used [-]"
+        default=0.9,
+        gt=0,
+        le=1,
+        description="fraction of the penalty's stability law that a step beside a penalty_constant takes [-]",
     )
     algorithm: Literal["midpoint", 1, 2, "original"] = Field(
         default="midpoint",
@@ -88,14 +102,15 @@ class Case(Parameters):
     )
     sweep_weights: Literal["chebyshev", "equal"] | None = Field(
         default=None,
-        description="how far each sweep goes; if not given chebyshev, or equal without courant",
+        description="how far each sweep goes; if not given chebyshev, or equal beside a penalty_constant",
     )
     tolerance: float = Field(default=1e-3, gt=0, description="largest |∇·u| at which the iterations end, ε [U/D]")
     penalty_constant: float | None = Field(
         default=None,
         ge=1,
         le=100,
-        description="penalty constant C_BV = (c/u_max)²; if not given what courant's step allows, without it 100 [-]",
+        description="penalty constant C_BV = (c/u_max)²; if not given it follows the step, or is 100 beside a time_step "
+        "without courant [-]",
     )
     smoothing_ratio: float = Field(
         default=4 / 3, ge=1, le=2, description="smoothing length over particle spacing, h/Δx [-]"
@@ -118,7 +133,7 @@ class Case(Parameters):
         ge=0.5,
         le=1,
         description="weight of the new velocity in the viscous term, 1/2 of second order in time, 1 in the paper; if "
-        "not given 1/2, or 1 without courant [-]",
+        "not given 1/2, or 1 beside a penalty_constant [-]",
     )
     shifting: Literal["xsph", "maximum_velocity", "none"] = Field(
         default="xsph", description="particle shifting: eq. (18), with β u_max in place of the XSPH velocity, or none"
@@ -137,18 +152,18 @@ class Case(Parameters):
     @model_validator(mode="before")
     @classmethod
     def _courant_or_the_paper(cls, values: dict[str, Any]) -> dict[str, Any]:
-        if values.get("courant") is None:
-            return values | {name: value for name, value in PAPER.items() if values.get(name) is None}
-        if values.get("penalty_constant") is not None:
+        given = {name for name in ("courant", *PAPER) if values.get(name) is not None}
+        if not given:
+            return values | {"courant": COURANT}
+        if "courant" not in given:
+            return values | {name: value for name, value in PAPER.items() if name not in given}
+        if "penalty_constant" in given:
             raise ValueError("courant and penalty_constant: the penalty follows the one or the other; leave one out")
         return values
 
     def replace(self, **changes: Any) -> Self:
-        """Return a case with some parameters changed; a Courant number takes the place of the paper's step."""
-        if changes.get("courant") is None:
-            return super().replace(**changes)
-        values = self.model_dump()
-        return type(self)(**{name: values[name] for name in values if values[name] != PAPER.get(name)} | changes)
+        """Return a case with some parameters changed; see `superseded`."""
+        return super().replace(**dict.fromkeys(superseded(changes)) | changes)
 
     @classmethod
     def parameter_names(cls) -> list[str]:
@@ -173,8 +188,10 @@ class Case(Parameters):
 
     @property
     def largest_time_step(self) -> float:
-        """Upper bound of the time step [Δx/U]."""
-        return self.time_step or self.courant or math.nan
+        """Upper bound of the time step, which all steps have that are not adaptive [Δx/U]."""
+        if self.time_step or not self.courant:
+            return self.time_step or math.nan
+        return self.courant / (1.0 if self.adaptive_time_step else self.velocity_max)
 
     @property
     def thickness(self) -> float:
@@ -499,7 +516,7 @@ class Case(Parameters):
         if self.penalty_constant is not None:
             return self.penalty_constant
         largest = time_step_limits(self.settings(), self.velocity_max)["lambda_max"]
-        return 2 / largest * (self.time_step_safety / (self.expected_time_step() * self.velocity_max)) ** 2
+        return (self.expected_time_step() * self.velocity_max) ** -2 / largest
 
     def time_step_warning(self) -> str | None:
         """Return a warning if steps are to be taken above the stability law, which it names."""
