@@ -103,7 +103,7 @@ fn equations(settings: &Settings, set: &Set<2>) -> (Vec<Vector<2>>, Vec<f64>) {
     let spacing = settings.particle_spacing;
     let penalty = match settings.penalty_constant {
         Some(constant) => constant * largest(&initial).powi(2) * dt,
-        None => 2.0 * (0.9 * spacing).powi(2) / (settings.largest_laplacian_eigenvalue() * dt),
+        None => spacing.powi(2) / (settings.largest_laplacian_eigenvalue() * dt),
     };
     let theta = settings.viscous_theta;
     let lead = settings.derivative_frame.fraction() * dt;

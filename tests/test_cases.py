@@ -108,8 +108,11 @@ def test_the_courant_number_and_the_pair_of_the_paper_take_the_place_of_one_anot
     assert given(paper.replace(courant=0.2)) == (0.2, None, None)
     assert given(paper.replace(reynolds=50)) == given(paper) and given(small.replace(reynolds=50)) == given(small)
     assert given(paper.replace(courant=0.2, time_step=0.1)) == (0.2, 0.1, None)
+    # The paper's algorithms are of first order in time.
+    assert given(small.replace(algorithm=2)) == given(Cylinder(algorithm=2)) == (None, 0.0508, 100.0)
+    assert given(Cylinder(algorithm=2, courant=0.1)) == (0.1, None, None)
     for case in (small, paper):
-        with pytest.raises(ConfigError, match="courant and penalty_constant: .* leave one out"):
+        with pytest.raises(ConfigError, match="courant and penalty_constant: .* leave the other out"):
             case.replace(courant=0.25, penalty_constant=100.0)
 
 

@@ -40,7 +40,7 @@ def test_limits_count(monkeypatch, small, tmp_path):
         small.replace(resolution=40, length=14.0, height=13.0, upstream=4.0).build(1)
     path = small.run(tmp_path / "run", until=0.02, threads=1, progress=False).path
     with pytest.raises(ConfigError, match="resolution = 8: about 1,792 particles need .* and 0 GiB are free"):
-        resume(path, until=0.03, threads=3)
+        resume(path, until=0.5, threads=3)
 
 
 def test_an_engine_that_panics_is_an_error(small, monkeypatch):

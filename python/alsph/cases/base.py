@@ -38,10 +38,16 @@ VELOCITY_LIMIT = 50.0
 """Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
 
 
+def _as_in_the_paper(values: Mapping[str, Any]) -> bool:
+    """Whether values ask for the paper's time step and penalty: by one of them, or by an algorithm of first order."""
+    return any(values.get(name) is not None for name in PAPER) or values.get("algorithm") not in (None, "midpoint")
+
+
 def superseded(changes: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the parameters whose place others take: a Courant number that of the paper's pair, either of those its."""
-    given = {name for name in ("courant", *PAPER) if changes.get(name) is not None}
-    return tuple(PAPER) if "courant" in given else ("courant",) if given else ()
+    """Names of the parameters whose place others take: a Courant number that of the paper's pair, and that its."""
+    if changes.get("courant") is not None:
+        return tuple(PAPER)
+    return ("courant",) if _as_in_the_paper(changes) else ()
 
 
 class Case(Parameters):
@@ -69,7 +75,7 @@ class Case(Parameters):
         gt=0,
         le=1,
         description="Courant number u_max Δt/Δx of a step, which the penalty follows; if not given 0.3, or none where "
-        "time_step or penalty_constant are given as in the paper [-]",
+        "time_step, penalty_constant or an algorithm of the paper are [-]",
     )
     time_step: float | None = Field(
         default=None,
@@ -109,8 +115,8 @@ class Case(Parameters):
         default=None,
         ge=1,
         le=100,
-        description="penalty constant C_BV = (c/u_max)²; if not given it follows the step, or is 100 beside a time_step "
-        "without courant [-]",
+        description="penalty constant C_BV = (c/u_max)²; if not given it follows the step, or is 100 beside "
+        "a time_step without courant [-]",
     )
     smoothing_ratio: float = Field(
         default=4 / 3, ge=1, le=2, description="smoothing length over particle spacing, h/Δx [-]"
@@ -152,14 +158,13 @@ class Case(Parameters):
     @model_validator(mode="before")
     @classmethod
     def _courant_or_the_paper(cls, values: dict[str, Any]) -> dict[str, Any]:
-        given = {name for name in ("courant", *PAPER) if values.get(name) is not None}
-        if not given:
+        if values.get("courant") is not None:
+            if values.get("penalty_constant") is not None:
+                raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")
+            return values
+        if not _as_in_the_paper(values):
             return values | {"courant": COURANT}
-        if "courant" not in given:
-            return values | {name: value for name, value in PAPER.items() if name not in given}
-        if "penalty_constant" in given:
-            raise ValueError("courant and penalty_constant: the penalty follows the one or the other; leave one out")
-        return values
+        return values | {name: value for name, value in PAPER.items() if values.get(name) is None}
 
     def replace(self, **changes: Any) -> Self:
         """Return a case with some parameters changed; see `superseded`."""
