@@ -47,7 +47,10 @@ pub enum VelocityLaplacian {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Shifting {
-    /// The XSPH velocity modulus u_v, as in (18).
+    /// `shift_coefficient` times the root mean square of the velocities of the neighbours relative to the particle: how fast the
+    /// neighbourhood is deformed, which brings the disorder.
+    RelativeVelocity,
+    /// The XSPH velocity modulus u_v, as in (18), which vanishes where the flow is symmetric about the particle.
     Xsph,
     /// `shift_coefficient` times the largest velocity, the older form.
     MaximumVelocity,

@@ -91,9 +91,9 @@ struct Displacement<'a, K, const D: usize, const SHARED: bool> {
 impl<K: Kernel, const D: usize, const SHARED: bool> Visit<Change<D>, ()> for Displacement<'_, K, D, SHARED> {
     #[inline(always)]
     fn visit<V: Lanes>(&self, cluster: Cluster, row: Row<'_>, out: &mut [Change<D>], _: &mut [()]) {
-        let Surroundings { asymmetry, relative, total, distances, count } = self.surroundings::<V>(cluster, row);
+        let Surroundings { asymmetry, relative, squares, total, distances, count } = self.surroundings::<V>(cluster, row);
         let (asymmetry, relative) = (vectors(asymmetry), vectors(relative));
-        let (total, distances, count) = (total.store(), distances.store(), count.store());
+        let (squares, total, distances, count) = (squares.store(), total.store(), distances.store(), count.store());
         let Particles { velocity, pressure, kind, .. } = self.particles;
         let (u, p): ([V; D], V) = (cluster.vectors(velocity), cluster.lanes(|i| pressure[i]));
         let (mut velocity_gradient, mut pressure_gradient) = ([[V::zero(); D]; D], [V::zero(); D]);
@@ -133,8 +133,13 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Visit<Change<D>, ()> for Dis
             // The particle itself is in the list: it is counted, and adds next to nothing to the other sums.
             let others = count[lane] - 1.0;
             let mean_distance = if others > 0.0 { distances[lane] / others } else { 0.0 };
-            let relative_speed = relative[lane].norm() / total[lane];
-            let shift = self.limited(asymmetry[lane], mean_distance, relative_speed);
+            let Settings { shifting, shift_coefficient, .. } = self.settings;
+            let speed = match shifting {
+                Shifting::Xsph => relative[lane].norm() / total[lane],
+                Shifting::RelativeVelocity => shift_coefficient * (squares[lane] / total[lane]).sqrt(),
+                _ => shift_coefficient * self.velocity_max,
+            };
+            let shift = self.limited(asymmetry[lane], mean_distance, speed);
             let carried = correction[i].inverse * shift;
             let gradient = (velocity_gradient[lane] + hidden[lane]) * correction[i].inverse;
             let solenoidal = self.settings.derivative_frame.solenoidal_divergence(&gradient, self.time_step);
@@ -152,8 +157,9 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Visit<Change<D>, ()> for Dis
 struct Surroundings<V, const D: usize> {
     /// Σ r_ij h³ / r_ij³.
     asymmetry: [V; D],
-    /// Σ w u_ij and Σ w, w the kernel without its factor.
+    /// Σ w u_ij, Σ w u_ij² and Σ w, w the kernel without its factor.
     relative: [V; D],
+    squares: V,
     total: V,
     /// Σ r_ij / h, and the number of neighbours with the particle itself.
     distances: V,
@@ -172,7 +178,7 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Displacement<'_, K, D, SHARE
         let u: [V; D] = cluster.vectors(velocity);
         let limit = V::splat(self.settings.neighbour_distance().powi(2));
         let (mut asymmetry, mut relative) = ([V::zero(); D], [V::zero(); D]);
-        let (mut total, mut distances, mut count) = (V::zero(), V::zero(), V::zero());
+        let (mut squares, mut total, mut distances, mut count) = (V::zero(), V::zero(), V::zero(), V::zero());
         for (pair, two) in row.all().chunks(2).enumerate() {
             // An odd last entry stands twice, the second time unused.
             let two_j = [two[0].j(), two[two.len() - 1].j()];
@@ -189,19 +195,17 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Displacement<'_, K, D, SHARE
                 distances = distances.plus_product(inside, q);
                 count += inside;
                 let weight = inside * value;
-                add_product(&mut relative, weight, from(u, &velocity[j]));
+                let u_ij = from(u, &velocity[j]);
+                add_product(&mut relative, weight, u_ij);
+                squares = squares.plus_product(weight, norm_squared(u_ij));
                 total += weight;
             }
         }
-        Surroundings { asymmetry, relative, total, distances, count }
+        Surroundings { asymmetry, relative, squares, total, distances, count }
     }
 
     /// δr (18), never longer than the limit.
-    fn limited(&self, asymmetry: Vector<D>, mean_distance: f64, relative_speed: f64) -> Vector<D> {
-        let speed = match self.settings.shifting {
-            Shifting::Xsph => relative_speed,
-            _ => self.settings.shift_coefficient * self.velocity_max,
-        };
+    fn limited(&self, asymmetry: Vector<D>, mean_distance: f64, speed: f64) -> Vector<D> {
         // The h³ of the one and the h² of the other leave 1/h.
         let scale = mean_distance * mean_distance / self.settings.smoothing_length();
         let shift = asymmetry * (scale * speed * self.time_step);

@@ -1,6 +1,7 @@
-//! How far particles are displaced: the two velocity scales of (18), and its limit.
+//! How far particles are displaced: the velocity scales of (18), and its limit.
 
 use alsph::boundary::Walls;
+use alsph::kernel::{QuinticSpline, Smoothing};
 use alsph::settings::Shifting;
 use alsph::shifting::shift;
 use alsph::{Settings, Vector};
@@ -27,30 +28,39 @@ fn shifts(settings: &Settings, time_step: f64) -> (Set<2>, Vec<Vector<2>>) {
 }
 
 #[test]
-fn the_older_form_goes_with_the_largest_velocity() {
+fn the_shift_goes_with_the_relative_or_with_the_largest_velocity() {
     let mut settings = common::settings::<2>(1.0 / SIDE as f64, "none");
-    settings.shifting = Shifting::MaximumVelocity;
+    let kernel = Smoothing::<QuinticSpline>::new(settings.smoothing_length(), 2);
     let time_step = 1e-4;
-    let (set, shifts) = shifts(&settings, time_step);
-    for i in 0..SIDE * SIDE {
-        let (mut asymmetry, mut distances, mut count) = (Vector::<2>::zeros(), 0.0, 0.0);
-        for j in (0..SIDE * SIDE).filter(|&j| j != i) {
-            let r_ij = set.particles.position[i] - set.particles.position[j];
-            if r_ij.norm() < settings.support_radius() {
-                asymmetry += r_ij / r_ij.norm().powi(3);
-                (distances, count) = (distances + r_ij.norm(), count + 1.0);
+    for shifting in [Shifting::RelativeVelocity, Shifting::MaximumVelocity] {
+        settings.shifting = shifting;
+        let (set, shifts) = shifts(&settings, time_step);
+        for i in 0..SIDE * SIDE {
+            let (mut asymmetry, mut distances, mut count) = (Vector::<2>::zeros(), 0.0, 0.0);
+            let (mut squares, mut total) = (0.0, kernel.value(0.0));
+            for j in (0..SIDE * SIDE).filter(|&j| j != i) {
+                let r_ij = set.particles.position[i] - set.particles.position[j];
+                if r_ij.norm() < settings.support_radius() {
+                    asymmetry += r_ij / r_ij.norm().powi(3);
+                    (distances, count) = (distances + r_ij.norm(), count + 1.0);
+                    let weight = kernel.value(r_ij.norm());
+                    squares += weight * (set.particles.velocity[i] - set.particles.velocity[j]).norm_squared();
+                    total += weight;
+                }
             }
+            let mean: f64 = distances / count;
+            let relative: f64 = squares / total;
+            let speed = if shifting == Shifting::RelativeVelocity { relative.sqrt() } else { VELOCITY_MAX };
+            let expected = asymmetry * (mean * mean * settings.shift_coefficient * speed * time_step);
+            assert_relative_eq!(shifts[i], expected, epsilon = 1e-5 * expected.norm());
         }
-        let mean: f64 = distances / count;
-        let expected = asymmetry * (mean * mean * settings.shift_coefficient * VELOCITY_MAX * time_step);
-        assert_relative_eq!(shifts[i], expected, epsilon = 1e-5 * expected.norm());
+        assert_eq!(shifts[SIDE * SIDE], Vector::<2>::zeros());
     }
-    assert_eq!(shifts[SIDE * SIDE], Vector::<2>::zeros());
 }
 
 #[test]
 fn no_shift_is_longer_than_its_limit() {
-    for shifting in [Shifting::Xsph, Shifting::MaximumVelocity] {
+    for shifting in [Shifting::RelativeVelocity, Shifting::Xsph, Shifting::MaximumVelocity] {
         let mut settings = common::settings::<2>(1.0 / SIDE as f64, "none");
         settings.shifting = shifting;
         let limit = settings.shift_limit / SIDE as f64;

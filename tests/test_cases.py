@@ -116,6 +116,15 @@ def test_the_courant_number_and_the_pair_of_the_paper_take_the_place_of_one_anot
             case.replace(courant=0.25, penalty_constant=100.0)
 
 
+def test_the_coefficient_of_the_shifting_is_that_of_its_kind(small):
+    assert (small.shifting, small.shift_coefficient) == ("relative_velocity", 0.5)
+    for kind in ("xsph", "maximum_velocity"):
+        assert small.replace(shifting=kind).shift_coefficient == Cylinder(shifting=kind).shift_coefficient == 0.04
+        assert small.replace(shifting=kind).replace(shifting="relative_velocity") == small
+    assert small.replace(shifting="maximum_velocity", shift_coefficient=0.1).shift_coefficient == 0.1
+    assert small.replace(shift_coefficient=0.3).replace(reynolds=50).shift_coefficient == 0.3
+
+
 def test_steps_that_are_not_adaptive_have_the_courant_number_at_the_expected_velocity(small):
     assert small.replace(adaptive_time_step=False).largest_time_step == pytest.approx(0.3 / 1.5)
     assert small.replace(adaptive_time_step=False).time_step_warning() is None

@@ -44,10 +44,14 @@ def _as_in_the_paper(values: Mapping[str, Any]) -> bool:
 
 
 def superseded(changes: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the parameters whose place others take: a Courant number that of the paper's pair, and that its."""
+    """Names of the parameters whose place others take.
+
+    A Courant number takes that of the paper's pair, which takes its; a kind of shifting that of another's coefficient.
+    """
+    coefficient = ("shift_coefficient",) if changes.get("shifting") is not None else ()
     if changes.get("courant") is not None:
-        return tuple(PAPER)
-    return ("courant",) if _as_in_the_paper(changes) else ()
+        return (*PAPER, *coefficient)
+    return ("courant", *coefficient) if _as_in_the_paper(changes) else coefficient
 
 
 class Case(Parameters):
@@ -141,10 +145,17 @@ class Case(Parameters):
         description="weight of the new velocity in the viscous term, 1/2 of second order in time, 1 in the paper; if "
         "not given 1/2, or 1 beside a penalty_constant [-]",
     )
-    shifting: Literal["xsph", "maximum_velocity", "none"] = Field(
-        default="xsph", description="particle shifting: eq. (18), with β u_max in place of the XSPH velocity, or none"
+    shifting: Literal["relative_velocity", "xsph", "maximum_velocity", "none"] = Field(
+        default="relative_velocity",
+        description="particle shifting: eq. (18) with β times the neighbours' rms relative velocity, with the XSPH "
+        "velocity as in the paper, with β u_max, or none",
     )
-    shift_coefficient: float = Field(default=0.04, ge=0, le=1, description="β of the maximum_velocity shifting [-]")
+    shift_coefficient: float | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="β of the shifting; if not given 0.5 of relative_velocity, 0.04 of maximum_velocity [-]",
+    )
     shift_limit: float = Field(default=0.1, gt=0, le=0.5, description="largest shift in a step [Δx]")
     wall_velocity: Literal["paper", "adami", "morris", "cubic"] = Field(
         default="cubic",
@@ -157,7 +168,10 @@ class Case(Parameters):
 
     @model_validator(mode="before")
     @classmethod
-    def _courant_or_the_paper(cls, values: dict[str, Any]) -> dict[str, Any]:
+    def _what_follows_from_others(cls, values: dict[str, Any]) -> dict[str, Any]:
+        if values.get("shift_coefficient") is None:
+            relative = values.get("shifting") in (None, "relative_velocity")
+            values = values | {"shift_coefficient": 0.5 if relative else 0.04}
         if values.get("courant") is not None:
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")

@@ -35,11 +35,6 @@ class TaylorGreen(Case):
         default=0.0, ge=0, le=0.5, description="random displacement of the initial lattice, at most [Δx]"
     )
     seed: int = Field(default=0, ge=0, description="seed of the random displacement")
-    # At the stagnation points the XSPH velocity of (18) vanishes, and lattice rows pressed together there without a
-    # shift make the step unstable (seen at 100 particles a side).
-    shifting: Literal["xsph", "maximum_velocity", "none"] = Field(
-        default="maximum_velocity", description=Case.model_fields["shifting"].description
-    )
 
     @property
     def default_until(self) -> float:
