@@ -34,6 +34,9 @@ COURANT = 0.3
 PAPER = {"time_step": 0.0508, "penalty_constant": 100.0}
 """ΔtU/Δx and C_BV where only one of them is given."""
 
+RELATIVE_SHIFT = {2: 0.5, 3: 0.2}
+"""β of the shifting by relative velocities, by the number of space dimensions (docs/experiments.md, Larger steps)."""
+
 VELOCITY_LIMIT = 50.0
 """Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
 
@@ -154,7 +157,8 @@ class Case(Parameters):
         default=None,
         ge=0,
         le=1,
-        description="β of the shifting; if not given 0.5 of relative_velocity, 0.04 of maximum_velocity [-]",
+        description="β of the shifting; if not given 0.5 of relative_velocity in 2-D, 0.2 in 3-D; 0.04 of "
+        "maximum_velocity [-]",
     )
     shift_limit: float = Field(default=0.1, gt=0, le=0.5, description="largest shift in a step [Δx]")
     wall_velocity: Literal["paper", "adami", "morris", "cubic"] = Field(
@@ -169,9 +173,8 @@ class Case(Parameters):
     @model_validator(mode="before")
     @classmethod
     def _what_follows_from_others(cls, values: dict[str, Any]) -> dict[str, Any]:
-        if values.get("shift_coefficient") is None:
-            relative = values.get("shifting") in (None, "relative_velocity")
-            values = values | {"shift_coefficient": 0.5 if relative else 0.04}
+        if values.get("shift_coefficient") is None and values.get("shifting") not in (None, "relative_velocity"):
+            values = values | {"shift_coefficient": 0.04}
         if values.get("courant") is not None:
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")
@@ -351,7 +354,7 @@ class Case(Parameters):
         shared = (
             "smoothing_ratio kernel adaptive_time_step adaptive_until time_step_safety max_iterations "
             "projection_sweeps penalty_constant velocity_laplacian laplacian_correction viscous_order shifting "
-            "shift_coefficient shift_limit wall_velocity wall_pressure"
+            "shift_limit wall_velocity wall_pressure"
         )
         return {name: getattr(self, name) for name in shared.split()} | {
             "dimensions": self.space_dimensions,
@@ -364,6 +367,9 @@ class Case(Parameters):
             "courant": self.courant,
             "viscous_theta": self.viscous_theta or (0.5 if follows else 1.0),
             "sweep_weights": self.sweep_weights or ("chebyshev" if follows else "equal"),
+            "shift_coefficient": RELATIVE_SHIFT[self.space_dimensions]
+            if self.shift_coefficient is None
+            else self.shift_coefficient,
             "derivative_frame": {2: "initial", "midpoint": "midpoint"}.get(self.algorithm, "updated"),
             "search_every_iteration": self.algorithm == "original",
             "divergence_tolerance": self.tolerance,
