@@ -11,9 +11,11 @@ from scipy.spatial import cKDTree
 
 def passes(case, iterations):
     """Passes over all pairs in a step: volumes, the first (which forms the corrections too), two of the shift, four an
-    iteration (five with Algorithm 1: the volumes in each), two a sweep, one for the fourth viscous order."""
+    iteration but for the last, whose derivatives come with the shift (five with Algorithm 1, the last too: the volumes
+    in each), two a sweep, one for the fourth viscous order."""
     sharpening = int(case.viscous_order == 4)
-    return 4 + (5 if case.algorithm == 1 else 4) * iterations + 2 * case.projection_sweeps + sharpening
+    iterating = 5 * iterations if case.algorithm == 1 else 4 * iterations - 1
+    return 4 + iterating + 2 * case.projection_sweeps + sharpening
 
 
 def channel_pairs(case, position):
