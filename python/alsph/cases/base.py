@@ -34,9 +34,6 @@ COURANT = 0.3
 PAPER = {"time_step": 0.0508, "penalty_constant": 100.0}
 """ΔtU/Δx and C_BV where only one of them is given."""
 
-RELATIVE_SHIFT = {2: 0.5, 3: 0.2}
-"""β of the shifting by relative velocities, by the number of space dimensions (docs/experiments.md, Larger steps)."""
-
 VELOCITY_LIMIT = 50.0
 """Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
 
@@ -49,9 +46,10 @@ def _as_in_the_paper(values: Mapping[str, Any]) -> bool:
 def superseded(changes: Mapping[str, Any]) -> tuple[str, ...]:
     """Names of the parameters whose place others take.
 
-    A Courant number takes that of the paper's pair, which takes its; a kind of shifting that of another's coefficient.
+    A Courant number takes that of the paper's pair, which takes its; the coefficient of a shifting goes with its kind.
     """
-    coefficient = ("shift_coefficient",) if changes.get("shifting") is not None else ()
+    other = any(changes.get(name) is not None for name in ("shifting", "dimensions"))
+    coefficient = ("shift_coefficient",) if other else ()
     if changes.get("courant") is not None:
         return (*PAPER, *coefficient)
     return ("courant", *coefficient) if _as_in_the_paper(changes) else coefficient
@@ -173,8 +171,12 @@ class Case(Parameters):
     @model_validator(mode="before")
     @classmethod
     def _what_follows_from_others(cls, values: dict[str, Any]) -> dict[str, Any]:
-        if values.get("shift_coefficient") is None and values.get("shifting") not in (None, "relative_velocity"):
-            values = values | {"shift_coefficient": 0.04}
+        if values.get("shift_coefficient") is None:
+            relative = values.get("shifting") in (None, "relative_velocity")
+            # In 3-D more neighbours push (docs/experiments.md, Larger steps).
+            values = values | {
+                "shift_coefficient": 0.04 if not relative else 0.2 if values.get("dimensions") == 3 else 0.5
+            }
         if values.get("courant") is not None:
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")
@@ -354,7 +356,7 @@ class Case(Parameters):
         shared = (
             "smoothing_ratio kernel adaptive_time_step adaptive_until time_step_safety max_iterations "
             "projection_sweeps penalty_constant velocity_laplacian laplacian_correction viscous_order shifting "
-            "shift_limit wall_velocity wall_pressure"
+            "shift_coefficient shift_limit wall_velocity wall_pressure"
         )
         return {name: getattr(self, name) for name in shared.split()} | {
             "dimensions": self.space_dimensions,
@@ -367,9 +369,6 @@ class Case(Parameters):
             "courant": self.courant,
             "viscous_theta": self.viscous_theta or (0.5 if follows else 1.0),
             "sweep_weights": self.sweep_weights or ("chebyshev" if follows else "equal"),
-            "shift_coefficient": RELATIVE_SHIFT[self.space_dimensions]
-            if self.shift_coefficient is None
-            else self.shift_coefficient,
             "derivative_frame": {2: "initial", "midpoint": "midpoint"}.get(self.algorithm, "updated"),
             "search_every_iteration": self.algorithm == "original",
             "divergence_tolerance": self.tolerance,
