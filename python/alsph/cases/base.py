@@ -172,11 +172,9 @@ class Case(Parameters):
     @classmethod
     def _what_follows_from_others(cls, values: dict[str, Any]) -> dict[str, Any]:
         if values.get("shift_coefficient") is None:
-            relative = values.get("shifting") in (None, "relative_velocity")
-            # In 3-D more neighbours push (docs/experiments.md, Larger steps).
-            values = values | {
-                "shift_coefficient": 0.04 if not relative else 0.2 if values.get("dimensions") == 3 else 0.5
-            }
+            relative = 0.2 if values.get("dimensions") == 3 else 0.5  # in 3-D more neighbours push
+            kind = values.get("shifting")
+            values = values | {"shift_coefficient": relative if kind in (None, "relative_velocity") else 0.04}
         if values.get("courant") is not None:
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")
