@@ -47,10 +47,9 @@ pub enum VelocityLaplacian {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Shifting {
-    /// `shift_coefficient` times the root mean square of the velocities of the neighbours relative to the particle: how fast the
-    /// neighbourhood is deformed, which brings the disorder.
-    RelativeVelocity,
-    /// The XSPH velocity modulus u_v, as in (18), which vanishes where the flow is symmetric about the particle.
+    /// `shift_coefficient` times the larger of u_v and h (½ tr (∇u)²)^½, the rate at which the flow presses neighbours together.
+    Strain,
+    /// The XSPH velocity modulus u_v, as in (18), which vanishes at stagnation points.
     Xsph,
     /// `shift_coefficient` times the largest velocity, the older form.
     MaximumVelocity,

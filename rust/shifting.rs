@@ -7,7 +7,7 @@ use crate::lanes::{Lanes, add_product, from, matrices, norm_squared, vectors};
 use crate::neighbours::{Cluster, Row, Visit};
 use crate::operators::Neighbours;
 use crate::parallel;
-use crate::particles::{ParticleKind, Particles, Vector};
+use crate::particles::{Matrix, ParticleKind, Particles, Vector};
 use crate::settings::{DerivativeFrame, Settings, Shifting};
 use crate::stencil::{Corrected, Stencil};
 use crate::with_kernel;
@@ -91,9 +91,9 @@ struct Displacement<'a, K, const D: usize, const SHARED: bool> {
 impl<K: Kernel, const D: usize, const SHARED: bool> Visit<Change<D>, ()> for Displacement<'_, K, D, SHARED> {
     #[inline(always)]
     fn visit<V: Lanes>(&self, cluster: Cluster, row: Row<'_>, out: &mut [Change<D>], _: &mut [()]) {
-        let Surroundings { asymmetry, relative, squares, total, distances, count } = self.surroundings::<V>(cluster, row);
+        let Surroundings { asymmetry, relative, total, distances, count } = self.surroundings::<V>(cluster, row);
         let (asymmetry, relative) = (vectors(asymmetry), vectors(relative));
-        let (squares, total, distances, count) = (squares.store(), total.store(), distances.store(), count.store());
+        let (total, distances, count) = (total.store(), distances.store(), count.store());
         let Particles { velocity, pressure, kind, .. } = self.particles;
         let (u, p): ([V; D], V) = (cluster.vectors(velocity), cluster.lanes(|i| pressure[i]));
         let (mut velocity_gradient, mut pressure_gradient) = ([[V::zero(); D]; D], [V::zero(); D]);
@@ -133,15 +133,17 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Visit<Change<D>, ()> for Dis
             // The particle itself is in the list: it is counted, and adds next to nothing to the other sums.
             let others = count[lane] - 1.0;
             let mean_distance = if others > 0.0 { distances[lane] / others } else { 0.0 };
+            let shown = velocity_gradient[lane] * correction[i].inverse;
             let Settings { shifting, shift_coefficient, .. } = self.settings;
+            let xsph = relative[lane].norm() / total[lane];
             let speed = match shifting {
-                Shifting::Xsph => relative[lane].norm() / total[lane],
-                Shifting::RelativeVelocity => shift_coefficient * (squares[lane] / total[lane]).sqrt(),
+                Shifting::Xsph => xsph,
+                Shifting::Strain => shift_coefficient * xsph.max(self.settings.smoothing_length() * pressing_rate(&shown)),
                 _ => shift_coefficient * self.velocity_max,
             };
             let shift = self.limited(asymmetry[lane], mean_distance, speed);
             let carried = correction[i].inverse * shift;
-            let gradient = (velocity_gradient[lane] + hidden[lane]) * correction[i].inverse;
+            let gradient = shown + hidden[lane] * correction[i].inverse;
             let solenoidal = self.settings.derivative_frame.solenoidal_divergence(&gradient, self.time_step);
             *out = Change {
                 position: shift,
@@ -153,13 +155,18 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Visit<Change<D>, ()> for Dis
     }
 }
 
+/// How fast a flow of this ∇u presses neighbours together: (½ tr (∇u)²)^½ where strain exceeds rotation (the strain rate itself if
+/// there is no rotation), zero in shear and in vortices.
+fn pressing_rate<const D: usize>(velocity_gradient: &Matrix<D>) -> f64 {
+    (0.5 * (velocity_gradient * velocity_gradient).trace()).max(0.0).sqrt()
+}
+
 /// The sums of (18), of the particle of each lane.
 struct Surroundings<V, const D: usize> {
     /// Σ r_ij h³ / r_ij³.
     asymmetry: [V; D],
-    /// Σ w u_ij, Σ w u_ij² and Σ w, w the kernel without its factor.
+    /// Σ w u_ij and Σ w, w the kernel without its factor.
     relative: [V; D],
-    squares: V,
     total: V,
     /// Σ r_ij / h, and the number of neighbours with the particle itself.
     distances: V,
@@ -178,7 +185,7 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Displacement<'_, K, D, SHARE
         let u: [V; D] = cluster.vectors(velocity);
         let limit = V::splat(self.settings.neighbour_distance().powi(2));
         let (mut asymmetry, mut relative) = ([V::zero(); D], [V::zero(); D]);
-        let (mut squares, mut total, mut distances, mut count) = (V::zero(), V::zero(), V::zero(), V::zero());
+        let (mut total, mut distances, mut count) = (V::zero(), V::zero(), V::zero());
         for (pair, two) in row.all().chunks(2).enumerate() {
             // An odd last entry stands twice, the second time unused.
             let two_j = [two[0].j(), two[two.len() - 1].j()];
@@ -195,13 +202,11 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Displacement<'_, K, D, SHARE
                 distances = distances.plus_product(inside, q);
                 count += inside;
                 let weight = inside * value;
-                let u_ij = from(u, &velocity[j]);
-                add_product(&mut relative, weight, u_ij);
-                squares = squares.plus_product(weight, norm_squared(u_ij));
+                add_product(&mut relative, weight, from(u, &velocity[j]));
                 total += weight;
             }
         }
-        Surroundings { asymmetry, relative, squares, total, distances, count }
+        Surroundings { asymmetry, relative, total, distances, count }
     }
 
     /// δr (18), never longer than the limit.

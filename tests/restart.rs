@@ -29,7 +29,7 @@ const FACTORS: [(&str, &[&str]); 16] = [
     ("wall_velocity", &["paper", "adami", "cubic", "morris"]),
     ("wall_pressure", &["paper", "adami", "linear"]),
     ("derivative_frame", &["midpoint", "updated", "initial", "updated, searched in every iteration"]),
-    ("shifting", &["relative_velocity", "xsph", "maximum_velocity", "none"]),
+    ("shifting", &["strain", "xsph", "maximum_velocity", "none"]),
     ("viscous_order", &["2", "4"]),
     ("velocity_laplacian", &["scalar", "vector"]),
     ("laplacian_correction", &["true", "false"]),

@@ -1,10 +1,12 @@
 //! How far particles are displaced: the velocity scales of (18), and its limit.
 
+use std::f64::consts::TAU;
+
 use alsph::boundary::Walls;
 use alsph::kernel::{QuinticSpline, Smoothing};
 use alsph::settings::Shifting;
 use alsph::shifting::shift;
-use alsph::{Settings, Vector};
+use alsph::{Matrix, Settings, Vector};
 use approx::assert_relative_eq;
 use common::set::Set;
 
@@ -13,13 +15,16 @@ mod common;
 const SIDE: usize = 14;
 const VELOCITY_MAX: f64 = 1.7;
 
-/// The shift of each particle of a disordered box, and of one that is alone.
+/// The shift of each particle of a disordered box of vortices, and of one that is alone.
 fn shifts(settings: &Settings, time_step: f64) -> (Set<2>, Vec<Vector<2>>) {
     let mut points = common::lattice::<2>(SIDE, 0.3);
     points.push(Vector::from([9.0, 9.0]));
     let mut set = Set::of(common::particles(points), settings, false);
     for i in 0..set.particles.real {
-        set.particles.velocity[i] = Vector::from([(3.0 * i as f64).sin(), (2.0 * i as f64).cos()]);
+        let [x, y] = (TAU * set.particles.position[i]).into();
+        let vortices = [x.sin() * y.cos(), -x.cos() * y.sin()];
+        set.particles.velocity[i] =
+            Vector::from(vortices) + 0.1 * Vector::from([(3.0 * i as f64).sin(), (2.0 * i as f64).cos()]);
     }
     let mut after = set.particles.clone();
     shift(settings, &mut after, &set.frame, &Walls::new(settings), time_step, VELOCITY_MAX, &mut Vec::new());
@@ -28,39 +33,53 @@ fn shifts(settings: &Settings, time_step: f64) -> (Set<2>, Vec<Vector<2>>) {
 }
 
 #[test]
-fn the_shift_goes_with_the_relative_or_with_the_largest_velocity() {
+fn the_shift_goes_with_the_xsph_velocity_the_strain_or_the_largest_velocity() {
     let mut settings = common::settings::<2>(1.0 / SIDE as f64, "none");
     let kernel = Smoothing::<QuinticSpline>::new(settings.smoothing_length(), 2);
     let time_step = 1e-4;
-    for shifting in [Shifting::RelativeVelocity, Shifting::MaximumVelocity] {
+    let mut strained = 0;
+    for shifting in [Shifting::Xsph, Shifting::Strain, Shifting::MaximumVelocity] {
         settings.shifting = shifting;
         let (set, shifts) = shifts(&settings, time_step);
         for i in 0..SIDE * SIDE {
             let (mut asymmetry, mut distances, mut count) = (Vector::<2>::zeros(), 0.0, 0.0);
-            let (mut squares, mut total) = (0.0, kernel.value(0.0));
+            let (mut relative, mut total) = (Vector::<2>::zeros(), kernel.value(0.0));
+            let (mut differences, mut moments) = (Matrix::<2>::zeros(), Matrix::<2>::zeros());
             for j in (0..SIDE * SIDE).filter(|&j| j != i) {
                 let r_ij = set.particles.position[i] - set.particles.position[j];
                 if r_ij.norm() < settings.support_radius() {
                     asymmetry += r_ij / r_ij.norm().powi(3);
                     (distances, count) = (distances + r_ij.norm(), count + 1.0);
+                    let u_ij = set.particles.velocity[i] - set.particles.velocity[j];
                     let weight = kernel.value(r_ij.norm());
-                    squares += weight * (set.particles.velocity[i] - set.particles.velocity[j]).norm_squared();
+                    relative += weight * u_ij;
                     total += weight;
+                    let slope = set.frame.stencil.volume[j] * kernel.slope(r_ij.norm());
+                    differences += slope * u_ij * r_ij.transpose();
+                    moments += slope * r_ij * r_ij.transpose();
                 }
             }
             let mean: f64 = distances / count;
-            let relative: f64 = squares / total;
-            let speed = if shifting == Shifting::RelativeVelocity { relative.sqrt() } else { VELOCITY_MAX };
-            let expected = asymmetry * (mean * mean * settings.shift_coefficient * speed * time_step);
+            let xsph: f64 = relative.norm() / total;
+            let gradient = differences * moments.try_inverse().unwrap();
+            let strain = settings.smoothing_length() * (0.5 * (gradient * gradient).trace()).max(0.0).sqrt();
+            strained += usize::from(shifting == Shifting::Strain && strain > xsph);
+            let speed = match shifting {
+                Shifting::Xsph => xsph,
+                Shifting::Strain => settings.shift_coefficient * xsph.max(strain),
+                _ => settings.shift_coefficient * VELOCITY_MAX,
+            };
+            let expected = asymmetry * (mean * mean * speed * time_step);
             assert_relative_eq!(shifts[i], expected, epsilon = 1e-5 * expected.norm());
         }
         assert_eq!(shifts[SIDE * SIDE], Vector::<2>::zeros());
     }
+    assert!(strained > SIDE && strained < SIDE * SIDE - SIDE, "{strained}");
 }
 
 #[test]
 fn no_shift_is_longer_than_its_limit() {
-    for shifting in [Shifting::RelativeVelocity, Shifting::Xsph, Shifting::MaximumVelocity] {
+    for shifting in [Shifting::Strain, Shifting::Xsph, Shifting::MaximumVelocity] {
         let mut settings = common::settings::<2>(1.0 / SIDE as f64, "none");
         settings.shifting = shifting;
         let limit = settings.shift_limit / SIDE as f64;

@@ -117,13 +117,13 @@ def test_the_courant_number_and_the_pair_of_the_paper_take_the_place_of_one_anot
 
 
 def test_the_coefficient_of_the_shifting_is_that_of_its_kind(small):
-    assert (small.shifting, small.settings()["shift_coefficient"]) == ("relative_velocity", 0.5)
+    assert (small.shifting, small.settings()["shift_coefficient"]) == ("strain", 0.75)
     assert TaylorGreen(dimensions=3) == TaylorGreen().replace(dimensions=3)
-    assert TaylorGreen(dimensions=3).shift_coefficient == 0.2
+    assert TaylorGreen(dimensions=3).shift_coefficient == 0.25
     assert TaylorGreen(dimensions=3, shift_coefficient=0.0).settings()["shift_coefficient"] == 0.0
     for kind in ("xsph", "maximum_velocity"):
         assert small.replace(shifting=kind).shift_coefficient == Cylinder(shifting=kind).shift_coefficient == 0.04
-        assert small.replace(shifting=kind).replace(shifting="relative_velocity") == small
+        assert small.replace(shifting=kind).replace(shifting="strain") == small
     assert small.replace(shifting="maximum_velocity", shift_coefficient=0.1).shift_coefficient == 0.1
     assert small.replace(shift_coefficient=0.3).replace(reynolds=50).shift_coefficient == 0.3
 

@@ -146,16 +146,16 @@ class Case(Parameters):
         description="weight of the new velocity in the viscous term, 1/2 of second order in time, 1 in the paper; if "
         "not given 1/2, or 1 beside a penalty_constant [-]",
     )
-    shifting: Literal["relative_velocity", "xsph", "maximum_velocity", "none"] = Field(
-        default="relative_velocity",
-        description="particle shifting: eq. (18) with β times the neighbours' rms relative velocity, with the XSPH "
-        "velocity as in the paper, with β u_max, or none",
+    shifting: Literal["strain", "xsph", "maximum_velocity", "none"] = Field(
+        default="strain",
+        description="particle shifting: eq. (18) with β times the larger of the XSPH velocity and h times the strain "
+        "rate, with the XSPH velocity as in the paper, with β u_max, or none",
     )
     shift_coefficient: float | None = Field(
         default=None,
         ge=0,
         le=1,
-        description="β of the shifting; if not given 0.5 of relative_velocity in 2-D, 0.2 in 3-D; 0.04 of "
+        description="β of the shifting; if not given 0.75 of strain in 2-D, 0.25 in 3-D; 0.04 of "
         "maximum_velocity [-]",
     )
     shift_limit: float = Field(default=0.1, gt=0, le=0.5, description="largest shift in a step [Δx]")
@@ -172,9 +172,9 @@ class Case(Parameters):
     @classmethod
     def _what_follows_from_others(cls, values: dict[str, Any]) -> dict[str, Any]:
         if values.get("shift_coefficient") is None:
-            relative = 0.2 if values.get("dimensions") == 3 else 0.5  # in 3-D more neighbours push
+            strain = 0.25 if values.get("dimensions") == 3 else 0.75  # in 3-D more neighbours push
             kind = values.get("shifting")
-            values = values | {"shift_coefficient": relative if kind in (None, "relative_velocity") else 0.04}
+            values = values | {"shift_coefficient": strain if kind in (None, "strain") else 0.04}
         if values.get("courant") is not None:
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")
