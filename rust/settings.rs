@@ -47,7 +47,8 @@ pub enum VelocityLaplacian {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Shifting {
-    /// `shift_coefficient` times the larger of u_v and h (½ tr (∇u)²)^½, the rate at which the flow presses neighbours together.
+    /// `shift_coefficient` times the larger of h (½ tr (∇u)²)^½, the rate at which the flow presses neighbours together, and a third of the
+    /// root mean square of the neighbours' relative velocities.
     Strain,
     /// The XSPH velocity modulus u_v, as in (18), which vanishes at stagnation points.
     Xsph,

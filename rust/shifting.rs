@@ -12,6 +12,10 @@ use crate::settings::{DerivativeFrame, Settings, Shifting};
 use crate::stencil::{Corrected, Stencil};
 use crate::with_kernel;
 
+/// How much of the neighbours' root mean square relative velocity the shift goes with where nothing is pressed together, as in shear and in
+/// vortices: enough to keep the spacing even, and no noise.
+const MIXING: f64 = 1.0 / 3.0;
+
 /// Displace the fluid particles towards an even spacing and carry velocity and pressure along to first order.
 /// `particles` stand at r^{n+1}; the derivatives are those of `frame`, where solids show the velocity of the viscous term: the
 /// velocity at rest would make ∇u too small next to a wall, and the displacement mix the boundary layer. `change` is what the particles were last changed by, kept
@@ -91,9 +95,9 @@ struct Displacement<'a, K, const D: usize, const SHARED: bool> {
 impl<K: Kernel, const D: usize, const SHARED: bool> Visit<Change<D>, ()> for Displacement<'_, K, D, SHARED> {
     #[inline(always)]
     fn visit<V: Lanes>(&self, cluster: Cluster, row: Row<'_>, out: &mut [Change<D>], _: &mut [()]) {
-        let Surroundings { asymmetry, relative, total, distances, count } = self.surroundings::<V>(cluster, row);
+        let Surroundings { asymmetry, relative, squares, total, distances, count } = self.surroundings::<V>(cluster, row);
         let (asymmetry, relative) = (vectors(asymmetry), vectors(relative));
-        let (total, distances, count) = (total.store(), distances.store(), count.store());
+        let (squares, total, distances, count) = (squares.store(), total.store(), distances.store(), count.store());
         let Particles { velocity, pressure, kind, .. } = self.particles;
         let (u, p): ([V; D], V) = (cluster.vectors(velocity), cluster.lanes(|i| pressure[i]));
         let (mut velocity_gradient, mut pressure_gradient) = ([[V::zero(); D]; D], [V::zero(); D]);
@@ -135,10 +139,12 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Visit<Change<D>, ()> for Dis
             let mean_distance = if others > 0.0 { distances[lane] / others } else { 0.0 };
             let shown = velocity_gradient[lane] * correction[i].inverse;
             let Settings { shifting, shift_coefficient, .. } = self.settings;
-            let xsph = relative[lane].norm() / total[lane];
             let speed = match shifting {
-                Shifting::Xsph => xsph,
-                Shifting::Strain => shift_coefficient * xsph.max(self.settings.smoothing_length() * pressing_rate(&shown)),
+                Shifting::Xsph => relative[lane].norm() / total[lane],
+                Shifting::Strain => {
+                    let pressing = self.settings.smoothing_length() * pressing_rate(&shown);
+                    shift_coefficient * pressing.max(MIXING * (squares[lane] / total[lane]).sqrt())
+                }
                 _ => shift_coefficient * self.velocity_max,
             };
             let shift = self.limited(asymmetry[lane], mean_distance, speed);
@@ -165,8 +171,9 @@ fn pressing_rate<const D: usize>(velocity_gradient: &Matrix<D>) -> f64 {
 struct Surroundings<V, const D: usize> {
     /// Σ r_ij h³ / r_ij³.
     asymmetry: [V; D],
-    /// Σ w u_ij and Σ w, w the kernel without its factor.
+    /// Σ w u_ij, Σ w u_ij² and Σ w, w the kernel without its factor.
     relative: [V; D],
+    squares: V,
     total: V,
     /// Σ r_ij / h, and the number of neighbours with the particle itself.
     distances: V,
@@ -185,7 +192,7 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Displacement<'_, K, D, SHARE
         let u: [V; D] = cluster.vectors(velocity);
         let limit = V::splat(self.settings.neighbour_distance().powi(2));
         let (mut asymmetry, mut relative) = ([V::zero(); D], [V::zero(); D]);
-        let (mut total, mut distances, mut count) = (V::zero(), V::zero(), V::zero());
+        let (mut squares, mut total, mut distances, mut count) = (V::zero(), V::zero(), V::zero(), V::zero());
         for (pair, two) in row.all().chunks(2).enumerate() {
             // An odd last entry stands twice, the second time unused.
             let two_j = [two[0].j(), two[two.len() - 1].j()];
@@ -202,11 +209,13 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Displacement<'_, K, D, SHARE
                 distances = distances.plus_product(inside, q);
                 count += inside;
                 let weight = inside * value;
-                add_product(&mut relative, weight, from(u, &velocity[j]));
+                let u_ij = from(u, &velocity[j]);
+                add_product(&mut relative, weight, u_ij);
+                squares = squares.plus_product(weight, norm_squared(u_ij));
                 total += weight;
             }
         }
-        Surroundings { asymmetry, relative, total, distances, count }
+        Surroundings { asymmetry, relative, squares, total, distances, count }
     }
 
     /// δr (18), never longer than the limit.

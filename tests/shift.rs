@@ -43,7 +43,7 @@ fn the_shift_goes_with_the_xsph_velocity_the_strain_or_the_largest_velocity() {
         let (set, shifts) = shifts(&settings, time_step);
         for i in 0..SIDE * SIDE {
             let (mut asymmetry, mut distances, mut count) = (Vector::<2>::zeros(), 0.0, 0.0);
-            let (mut relative, mut total) = (Vector::<2>::zeros(), kernel.value(0.0));
+            let (mut relative, mut squares, mut total) = (Vector::<2>::zeros(), 0.0, kernel.value(0.0));
             let (mut differences, mut moments) = (Matrix::<2>::zeros(), Matrix::<2>::zeros());
             for j in (0..SIDE * SIDE).filter(|&j| j != i) {
                 let r_ij = set.particles.position[i] - set.particles.position[j];
@@ -53,6 +53,7 @@ fn the_shift_goes_with_the_xsph_velocity_the_strain_or_the_largest_velocity() {
                     let u_ij = set.particles.velocity[i] - set.particles.velocity[j];
                     let weight = kernel.value(r_ij.norm());
                     relative += weight * u_ij;
+                    squares += weight * u_ij.norm_squared();
                     total += weight;
                     let slope = set.frame.stencil.volume[j] * kernel.slope(r_ij.norm());
                     differences += slope * u_ij * r_ij.transpose();
@@ -60,13 +61,13 @@ fn the_shift_goes_with_the_xsph_velocity_the_strain_or_the_largest_velocity() {
                 }
             }
             let mean: f64 = distances / count;
-            let xsph: f64 = relative.norm() / total;
             let gradient = differences * moments.try_inverse().unwrap();
             let strain = settings.smoothing_length() * (0.5 * (gradient * gradient).trace()).max(0.0).sqrt();
-            strained += usize::from(shifting == Shifting::Strain && strain > xsph);
+            let mixing = f64::sqrt(squares / total) / 3.0;
+            strained += usize::from(shifting == Shifting::Strain && strain > mixing);
             let speed = match shifting {
-                Shifting::Xsph => xsph,
-                Shifting::Strain => settings.shift_coefficient * xsph.max(strain),
+                Shifting::Xsph => relative.norm() / total,
+                Shifting::Strain => settings.shift_coefficient * strain.max(mixing),
                 _ => settings.shift_coefficient * VELOCITY_MAX,
             };
             let expected = asymmetry * (mean * mean * speed * time_step);

@@ -148,8 +148,8 @@ class Case(Parameters):
     )
     shifting: Literal["strain", "xsph", "maximum_velocity", "none"] = Field(
         default="strain",
-        description="particle shifting: eq. (18) with β times the larger of the XSPH velocity and h times the strain "
-        "rate, with the XSPH velocity as in the paper, with β u_max, or none",
+        description="particle shifting: eq. (18) with β times how fast the flow strains a neighbourhood, with the XSPH "
+        "velocity as in the paper, with β u_max, or none",
     )
     shift_coefficient: float | None = Field(
         default=None,
