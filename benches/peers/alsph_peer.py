@@ -30,12 +30,13 @@ def channel_pairs(case, position):
 
 
 parser = argparse.ArgumentParser()
-parser.add_argument("case", choices=["cylinder", "taylor_green"])
+parser.add_argument("case", choices=["cavity", "cylinder", "taylor_green"])
 parser.add_argument("--resolution", type=int, default=20)
 parser.add_argument("--algorithm", type=int, help="the paper's; in the middle of the step if not given")
 parser.add_argument("--paper", action="store_true", help="five iterations, no sweeps, a viscous term of second order")
 parser.add_argument("--steps", type=int, default=20, help="steps to time, of the cylinder")
-parser.add_argument("--until", type=float, default=1.0, help="time to reach, of the vortex")
+parser.add_argument("--until", type=float, help="time to reach, D/U; for the cylinder in place of the steps")
+parser.add_argument("--window", type=float, default=5.0, help="length of the averages at the end, D/U")
 parser.add_argument("--perturb", type=float, default=0, help="width of the vortex's random displacement, Δx")
 options = parser.parse_args()
 
@@ -46,23 +47,39 @@ result = {"code": ", ".join(code)}
 method = {"resolution": options.resolution, "algorithm": algorithm}
 if options.paper:
     method |= {"max_iterations": 5, "projection_sweeps": 0, "viscous_order": 2}
-cpu = []
 if options.case == "cylinder":
-    case = alsph.cases.Cylinder(reynolds=200, **method)
-    simulation = case.simulation(threads=1)
-    for _ in range(WARM_UP + options.steps):
-        simulation.advance(1)
-        cpu.append(time.process_time())
+    case, until = alsph.cases.Cylinder(reynolds=200, **method), options.until
+elif options.case == "cavity":
+    case, until = alsph.cases.Cavity(reynolds=100, **method), options.until or 1.0
 else:
-    case = alsph.cases.TaylorGreen(reynolds=100, perturbation=options.perturb / 2, **method)
-    simulation = case.simulation(threads=1)
-    while simulation.time < options.until:
-        simulation.advance(1)
-        cpu.append(time.process_time())
+    case, until = (
+        alsph.cases.TaylorGreen(reynolds=100, perturbation=options.perturb / 2, **method),
+        options.until or 1.0,
+    )
+simulation = case.simulation(threads=1)
+line, middle = np.linspace(0, 1, 201), np.full(201, 0.5)
+cpu, late = [], []
+while simulation.time < until if until else len(cpu) < WARM_UP + options.steps:
+    simulation.advance(1)
+    cpu.append(time.process_time())
+    if options.case == "cavity" and simulation.time >= until - options.window + len(late) / 4:
+        points = np.column_stack([np.r_[middle, line], np.r_[line, middle]])
+        late.append(simulation.sample(points)["velocity"])
+        cpu = [before + time.process_time() - cpu[-1] for before in cpu]  # as if it had taken no time
 history, state = simulation.history(), simulation.snapshot()
 position = state["position"]
 if options.case == "cylinder":
     count = channel_pairs(case, position)
+    if until:
+        late = history["time"] >= until - options.window
+        result |= {"drag": float(np.mean(history["drag_coefficient"][late]))}
+        result |= {"lift": float(np.std(history["lift_coefficient"][late]))}
+elif options.case == "cavity":
+    count = cKDTree(position).count_neighbors(
+        cKDTree(position), 3 * case.smoothing_ratio / case.resolution * (1 + 5e-7)
+    )
+    u, v = np.mean(late, axis=0)[:201, 0], np.mean(late, axis=0)[201:, 1]
+    result["extrema"] = [float(u.min()), float(v.max()), float(v.min())]
 else:
     radius = 3 * case.smoothing_ratio / case.resolution * (1 + 5e-7)
     tree = cKDTree(position % 1, boxsize=1)
@@ -85,6 +102,7 @@ print(
         | {
             "particles": len(position),
             "neighbours": count / len(position),
+            "cpu_per_time": (cpu[-1] - cpu[0]) / (history["time"][-1] - history["time"][0]),
             "cpu_per_step": float(np.median(np.diff(cpu[WARM_UP - 1 :]))),
             "time_step": float(np.mean(history["time_step"][WARM_UP:])),
             "pair_passes_per_step": float(count * np.mean([passes(case, m) for m in iterations])),

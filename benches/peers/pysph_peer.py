@@ -1,11 +1,15 @@
 """Time PySPH on alsph's cases and print one line of JSON. Runs in the environment that run.py makes."""
 
 import argparse
+import contextlib
+import io
 import json
 import time
 
 import numpy as np
-from pysph.examples import flow_past_cylinder_2d, taylor_green
+from pysph.examples import cavity, flow_past_cylinder_2d, taylor_green
+from pysph.solver.utils import iter_output
+from pysph.tools.interpolator import Interpolator
 from scipy.spatial import cKDTree
 
 
@@ -35,6 +39,14 @@ class Cylinder(flow_past_cylinder_2d.WindTunnel):
 
 
 class TaylorGreen(taylor_green.TaylorGreen):
+    """The example as it is."""
+
+    def post_step(self, solver):
+        """Note the end of a step."""
+        clock.tick(solver)
+
+
+class Cavity(cavity.LidDrivenCavity):
     """The example as it is."""
 
     def post_step(self, solver):
@@ -88,33 +100,59 @@ def errors(fluid, time):
     }
 
 
+def extrema(app, start):
+    """Return the smallest u and the largest and smallest v on the centre lines, of the mean of the late outputs."""
+    line, middle = np.linspace(0, 1, 201), np.full(201, 0.5)
+    u, v = [], []
+    for data, arrays in iter_output(app.output_files):
+        if data["t"] >= start:
+            sources = list(arrays.values())
+            u.append(Interpolator(sources, x=middle, y=line, method="order1").interpolate("u"))
+            v.append(Interpolator(sources, x=line, y=middle, method="order1").interpolate("v"))
+    u, v = np.mean(u, axis=0), np.mean(v, axis=0)
+    return [float(u.min()), float(v.max()), float(v.min())]
+
+
+def forces(app, start):
+    """Return the mean drag and the rms lift coefficient of the late outputs, as the example finds them."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        time, drag, lift = app._plot_force_vs_t()
+    late = time >= start
+    return {"drag": float(np.mean(drag[late])), "lift": float(np.std(lift[late]))}
+
+
 parser = argparse.ArgumentParser()
-parser.add_argument("case", choices=["cylinder", "taylor_green"])
+parser.add_argument("case", choices=["cavity", "cylinder", "taylor_green"])
 parser.add_argument("--resolution", type=int, default=20)
 parser.add_argument("--smoothing-ratio", type=float, default=4 / 3)
 parser.add_argument("--steps", type=int, default=20, help="steps to time, of the cylinder")
-parser.add_argument("--until", type=float, default=1.0, help="time to reach, of the vortex")
+parser.add_argument("--until", type=float, help="time to reach, D/U; for the cylinder in place of the steps")
+parser.add_argument("--window", type=float, default=5.0, help="length of the averages at the end, D/U")
 parser.add_argument("--scheme", default="edac")
 parser.add_argument("--perturb", type=float, default=0, help="width of the vortex's random displacement, Δx")
 parser.add_argument("--cache", action="store_true")
-parser.add_argument("--output", default="pysph_output")
 options = parser.parse_args()
 
 WARM_UP = 5
 clock = Clock()
-arguments = [f"--nx={options.resolution}", f"--hdx={options.smoothing_ratio}", f"--directory={options.output}"]
+arguments = [f"--nx={options.resolution}", "--directory=output"]
 if options.case == "taylor_green":
-    app = TaylorGreen()
-    arguments += [f"--scheme={options.scheme}", f"--tf={options.until}", f"--perturb={options.perturb}"]
-    arguments += ["--pfreq=1000000"]
+    app, until = TaylorGreen(), options.until or 1.0
+    arguments += [f"--scheme={options.scheme}", f"--tf={until}", f"--perturb={options.perturb}"]
+    arguments += [f"--hdx={options.smoothing_ratio}", "--pfreq=1000000"]
+elif options.case == "cavity":
+    app, until = Cavity(), options.until or 1.0
+    arguments += [f"--scheme={options.scheme}", f"--tf={until}"]
 else:
-    app = Cylinder()
-    arguments += [f"--max-steps={WARM_UP + options.steps}", "--disable-output"]
+    app, until = Cylinder(), options.until
+    arguments.append(f"--hdx={options.smoothing_ratio}")
+    arguments += [f"--tf={1.2 * until}"] if until else [f"--max-steps={WARM_UP + options.steps}", "--disable-output"]
 if options.cache:
     arguments.append("--cache-nnps")
 app.run(arguments)
 solver = app.solver
-unit, period = (app.dc, None) if options.case == "cylinder" else (1.0, 1.0)
+unit = app.dc if options.case == "cylinder" else 1.0
+period = 1.0 if options.case == "taylor_green" else None
 found = loops(solver.acceleration_evals[0])
 fluid = solver.particles[0]
 result = {
@@ -125,9 +163,14 @@ result = {
     "smoothing_ratio": options.smoothing_ratio,
     "neighbours": pairs(solver, "fluid", "fluid", period) / np.sum(fluid.tag == 0) - 1,
     "cpu_per_step": float(np.median(np.diff(clock.cpu[WARM_UP - 1 :]))),
+    "cpu_per_time": (clock.cpu[-1] - clock.cpu[0]) / (clock.time[-1] - clock.time[0]) * unit,
     "time_step": float(np.mean(np.diff(clock.time[WARM_UP - 1 :]))) / unit,
     "pair_passes_per_step": sum(count * pairs(solver, *pair, period) for pair, count in found.items()),
 }
 if options.case == "taylor_green":
     result |= errors(fluid, solver.t)
+elif options.case == "cavity":
+    result["extrema"] = extrema(app, until - options.window)
+elif until:
+    result |= forces(app, unit * (until - options.window))
 print(json.dumps(result))

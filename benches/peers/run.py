@@ -9,21 +9,10 @@ that cannot be installed is left out.
 """
 
 import argparse
-import json
-import os
 import statistics
-import subprocess
-import sys
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
-
-# Name: interpreter, packages, driver.
-CODES = {
-    "alsph": (sys.executable, [str(HERE.parents[1]), "scipy"], "alsph_peer.py"),
-    "pysph": (sys.executable, ["pysph==1.0b2", "scipy"], "pysph_peer.py"),
-    "jax-sph": ("python3.10", ["jax-sph==0.1.0", "scipy"], "jax_sph_peer.py"),
-}
+from codes import ENVIRONMENTS, measure
 
 CASES = {
     "cylinder": [
@@ -57,43 +46,19 @@ CASES = {
 }
 
 
-def environment(name, folder):
-    """Return the interpreter of a code's environment, made if it is not there."""
-    interpreter, packages, _ = CODES[name]
-    python = folder / name / "bin" / "python"
-    if not (folder / name / "ready").exists():
-        subprocess.run([interpreter, "-m", "venv", "--clear", str(folder / name)], check=True)
-        subprocess.run([str(python), "-m", "pip", "install", "--quiet", *packages], check=True)
-        (folder / name / "ready").touch()
-    return str(python)
-
-
-def measure(name, arguments, folder):
+def rates(name, arguments, folder):
     """Run one code once; return what its driver prints, with the rates, or None if it fails."""
-    try:
-        python = environment(name, folder)
-    except (OSError, subprocess.CalledProcessError) as error:
-        print(f"{name} could not be installed: {error}", file=sys.stderr)
-        return None
-    command = [python, str(HERE / CODES[name][2]), *arguments]
-    if name == "pysph":
-        command.append(f"--output={folder / 'output'}")
-    # One thread each; the drivers of this folder must not shadow installed packages.
-    limits = {"OMP_NUM_THREADS": "1", "JAX_PLATFORMS": "cpu", "PYTHONSAFEPATH": "1"}
-    done = subprocess.run(command, cwd=folder, env=os.environ | limits, capture_output=True, text=True)
-    if done.returncode:
-        print(f"{name} {' '.join(arguments)} failed:\n{done.stderr[-800:]}", file=sys.stderr)
-        return None
-    result = json.loads(done.stdout.splitlines()[-1])
-    result["cpu_per_time"] = result["cpu_per_step"] / result["time_step"]
-    result["cpu_per_particle"] = result["cpu_per_step"] / result["particles"]
-    result["rate"] = result["pair_passes_per_step"] / result["cpu_per_step"]
+    result = measure(name, arguments, folder)
+    if result:
+        result["cpu_per_time"] = result["cpu_per_step"] / result["time_step"]
+        result["cpu_per_particle"] = result["cpu_per_step"] / result["particles"]
+        result["rate"] = result["pair_passes_per_step"] / result["cpu_per_step"]
     return result
 
 
 def compare(case, rounds, folder):
     """Run the codes of a case in turn and print a table."""
-    results = [[measure(name, arguments, folder) for name, arguments in CASES[case]] for _ in range(rounds)]
+    results = [[rates(name, arguments, folder) for name, arguments in CASES[case]] for _ in range(rounds)]
     print(f"\n{case}: the median of {rounds} rounds; CPU seconds of one core\n")
     print(
         "| code | particles | neighbours | Δt | µs a particle and step | pair-passes/s | s a unit of flow time ", end=""
@@ -130,7 +95,7 @@ def compare(case, rounds, folder):
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("cases", nargs="*", default=list(CASES), help=f"of {', '.join(CASES)}")
 parser.add_argument("--rounds", type=int, default=3)
-parser.add_argument("--environments", type=Path, default=HERE / "environments", help="folder for the environments")
+parser.add_argument("--environments", type=Path, default=ENVIRONMENTS, help="folder for the environments")
 options = parser.parse_args()
 options.environments.mkdir(parents=True, exist_ok=True)
 for case in options.cases:

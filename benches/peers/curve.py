@@ -1,0 +1,134 @@
+"""Cost and accuracy of alsph and its peers: CPU seconds of one core a unit of flow time against the error reached.
+
+Rows are kept in curve.jsonl as they come, and those that are there are not run again; `--plot` only draws.
+
+    python benches/peers/curve.py                      # everything: days
+    python benches/peers/curve.py taylor_green cavity  # some cases
+    python benches/peers/curve.py --most 600           # only what takes less CPU time than that, as far as is known
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+from alsph import plotting, reference
+from alsph.tables import markdown
+from codes import ENVIRONMENTS, HERE, measure
+from matplotlib.figure import Figure
+
+ROWS = HERE / "curve.jsonl"
+PICTURE = HERE.parents[1] / "docs" / "images" / "cost_error.png"
+
+# What the arguments of a driver are called in the picture, and how they are drawn.
+VARIANTS = {
+    "alsph": ("alsph", [], "C0o-"),
+    "paper": ("alsph", ["--paper"], "C2s-"),
+    "edac": ("pysph", ["--scheme=edac", "--cache", "--smoothing-ratio=1"], "C1^-"),
+    "sisph": ("pysph", ["--scheme=sisph", "--cache", "--smoothing-ratio=1"], "C3v-"),
+}
+NAMES = {"alsph": "alsph", "paper": "the paper's Algorithm 2, in alsph", "edac": "PySPH, EDAC", "sisph": "PySPH, SISPH"}
+
+# Case: arguments, resolutions, variants, and what the error is of.
+CASES = {
+    "taylor_green": (
+        ["--until=1"],
+        [25, 50, 100],
+        ["alsph", "paper", "edac", "sisph"],
+        "Taylor-Green, Re = 100: velocity",
+    ),
+    "cavity": (["--until=20"], [25, 50, 100], ["alsph", "paper", "edac"], "cavity, Re = 100: worst extremum"),
+    "cylinder": (
+        ["--until=40", "--window=15"],
+        [10, 15, 20, 30],
+        ["alsph", "paper", "edac"],
+        "cylinder, Re = 200: drag",
+    ),
+}
+
+
+def error(case: str, row: dict) -> float:
+    """Return the error of a row, relative to the reference; NaN if the run gave none."""
+    if case == "taylor_green":
+        return row["velocity_error"]
+    if case == "cavity":
+        known = reference.row("cavity_extrema.csv", 100) or {}
+        exact = np.array([float(known[name]) for name in ("umin", "vmax", "vmin")])
+        return float(np.max(np.abs(np.array(row["extrema"]) / exact - 1)))
+    solution = reference.cylinder_in_channel(200)
+    return abs(row["drag"] / solution.results["mean drag coefficient"] - 1) if solution else np.nan
+
+
+def read() -> dict[tuple[str, str, int], dict]:
+    """Return the rows that are there, by case, variant and resolution."""
+    lines = ROWS.read_text().splitlines() if ROWS.exists() else []
+    return {(row["case"], row["variant"], row["resolution"]): row for row in map(json.loads, lines)}
+
+
+def run(cases: list[str], most: float, folder: Path) -> None:
+    """Run what is missing, the cheap before the dear."""
+    for case in cases:
+        arguments, resolutions, variants, _ = CASES[case]
+        for resolution in resolutions:
+            for variant in variants:
+                rows = read()
+                before = rows.get((case, variant, resolutions[max(0, resolutions.index(resolution) - 1)]))
+                likely = (
+                    before["cpu_per_time"] * before["until"] * (resolution / before["resolution"]) ** 3 if before else 0
+                )
+                if (case, variant, resolution) in rows or likely > most:
+                    continue
+                name, more, _ = VARIANTS[variant]
+                result = measure(name, [case, f"--resolution={resolution}", *arguments, *more], folder)
+                if result is None:
+                    continue
+                until = float(arguments[0].partition("=")[2])
+                row = {"case": case, "variant": variant, "resolution": resolution, "until": until} | result
+                with ROWS.open("a") as file:
+                    file.write(json.dumps(row) + "\n")
+                print(
+                    f"{case} {variant} {resolution}: {row['cpu_per_time']:.3g} s, error {error(case, row):.3%}",
+                    flush=True,
+                )
+
+
+def plot(path: Path) -> None:
+    """Draw the errors over the cost, a panel a case."""
+    rows = read()
+    figure = Figure(figsize=(10, 3.6), layout="constrained")
+    for axes, (case, (_, resolutions, variants, title)) in zip(
+        figure.subplots(1, len(CASES)), CASES.items(), strict=True
+    ):
+        for variant in variants:
+            found = [rows[case, variant, n] for n in resolutions if (case, variant, n) in rows]
+            cost, errors = [row["cpu_per_time"] for row in found], [100 * error(case, row) for row in found]
+            axes.loglog(cost, errors, VARIANTS[variant][2], ms=5, lw=1, label=NAMES[variant])
+            for row, x, y in zip(found, cost, errors, strict=True):
+                axes.annotate(f"{row['resolution']}", (x, y), textcoords="offset points", xytext=(4, 4), fontsize=7)
+        axes.set(title=title, xlabel="CPU s a unit of flow time, one core", ylabel="error [%]")
+        axes.grid(alpha=0.3, which="both")
+    figure.axes[0].legend(fontsize=8)
+    plotting.save(figure, path)
+
+
+def main() -> None:
+    """Run what is missing, print the table and draw the picture."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", nargs="*", default=list(CASES), help=f"of {', '.join(CASES)}")
+    parser.add_argument("--most", type=float, default=np.inf, help="largest expected CPU time of a run [s]")
+    parser.add_argument("--plot", action="store_true", help="run nothing")
+    parser.add_argument("--environments", type=Path, default=ENVIRONMENTS, help="folder for the environments")
+    options = parser.parse_args()
+    options.environments.mkdir(parents=True, exist_ok=True)
+    if not options.plot:
+        run(options.cases, options.most, options.environments.resolve())
+    cells = [
+        [case, NAMES[variant], str(n), f"{row['cpu_per_time']:.3g}", f"{100 * error(case, row):.2g} %"]
+        for (case, variant, n), row in sorted(read().items())
+    ]
+    print(markdown(["case", "code", "resolution", "CPU s a unit of flow time", "error"], cells))
+    plot(PICTURE)
+
+
+if __name__ == "__main__":
+    main()
