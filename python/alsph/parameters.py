@@ -55,7 +55,7 @@ class Parameters(BaseModel):
 
     def __init__(self, *unnamed: Any, **values: Any) -> None:
         if unnamed:
-            kind, name = type(self).__name__, next(iter(type(self).model_fields))
+            kind, name = type(self).__name__, type(self).parameter_names()[0]
             raise ConfigError(f"{kind}: parameters are given by name, as {kind}({name}={shown(unnamed[0])})")
         try:
             super().__init__(**{name: _plain(name, value) for name, value in values.items()})
@@ -77,9 +77,15 @@ class Parameters(BaseModel):
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         """Append the parameters, from their fields, to the docstring."""
         lines = [
-            f"{name} : default {describe_default(cls, name)}\n    {cls.describe(name)}" for name in cls.model_fields
+            f"{name} : default {describe_default(cls, name)}\n    {cls.describe(name)}"
+            for name in cls.parameter_names()
         ]
         cls.__doc__ = f"{inspect.cleandoc(cls.__doc__ or '')}\n\nParameters\n----------\n" + "\n".join(lines)
+
+    @classmethod
+    def parameter_names(cls) -> list[str]:
+        """Return the names of the parameters in the order in which they are told."""
+        return list(cls.model_fields)
 
     @classmethod
     def describe(cls, name: str) -> str:
@@ -124,7 +130,8 @@ def _plain(name: str, value: Any) -> Any:
 
 
 def _mistakes(model: type[Parameters], error: ValidationError) -> list[str]:
-    mistakes = error.errors()
+    order: dict[int | str, int] = {name: place for place, name in enumerate(model.parameter_names())}
+    mistakes = sorted(error.errors(), key=lambda mistake: order.get(mistake["loc"][0], -1) if mistake["loc"] else -1)
     texts = [_mistake(model, mistake) for mistake in mistakes[:MOST_MISTAKES]]
     others = len(mistakes) - len(texts)
     return [*texts, f"and {others} more"] if others else texts

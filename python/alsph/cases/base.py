@@ -1,61 +1,34 @@
-"""What all cases share: the numerical parameters, and how a case becomes a simulation or a run."""
+"""What all cases share: how a case becomes a simulation or a run."""
 
 from __future__ import annotations
 
 import math
 import warnings
 from abc import abstractmethod
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from alsph import remarks
+from alsph.cases.method import Method
 from alsph.errors import ConfigError
 from alsph.geometry import FloatArray, Kind, Problem
 from alsph.measures import Measure, Profile
 from alsph.memory import check
-from alsph.parameters import Parameters
 
 if TYPE_CHECKING:
     from alsph.results import Run
     from alsph.simulation import Simulation
     from alsph.surface import Surface
 
-SUPPORT = {"quintic_spline": 3, "wendland_c2": 2, "wendland_c4": 2}
-"""Support radius of each kernel in smoothing lengths."""
-
-COURANT = 0.3
-"""Courant number where neither it nor the paper's pair is given."""
-
-PAPER = {"time_step": 0.0508, "penalty_constant": 100.0}
-"""ΔtU/Δx and C_BV where only one of them is given."""
-
 VELOCITY_LIMIT = 50.0
 """Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
 
 
-def _as_in_the_paper(values: Mapping[str, Any]) -> bool:
-    """Whether values ask for the paper's time step and penalty: by one of them, or by an algorithm of first order."""
-    return any(values.get(name) is not None for name in PAPER) or values.get("algorithm") not in (None, "midpoint")
-
-
-def superseded(changes: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the parameters whose place others take.
-
-    A Courant number takes that of the paper's pair, which takes its; the coefficient of a shifting goes with its kind.
-    """
-    other = any(changes.get(name) is not None for name in ("shifting", "dimensions"))
-    coefficient = ("shift_coefficient",) if other else ()
-    if changes.get("courant") is not None:
-        return (*PAPER, *coefficient)
-    return ("courant", *coefficient) if _as_in_the_paper(changes) else coefficient
-
-
-class Case(Parameters):
+class Case(Method):
     """A flow problem with its numerical parameters.
 
     Every case is computed in its own reference units: lengths in D, velocities in U, density in ρ, hence times in D/U,
@@ -75,123 +48,11 @@ class Case(Parameters):
 
     reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, ge=8, description="particles per reference length, D/Δx [-]")
-    courant: float | None = Field(
-        default=None,
-        gt=0,
-        le=1,
-        description="Courant number u_max Δt/Δx of a step, which the penalty follows; if not given 0.3, or none where "
-        "time_step, penalty_constant or an algorithm of the paper are [-]",
-    )
-    time_step: float | None = Field(
-        default=None,
-        gt=0,
-        description="upper bound of the time step, ΔtU/Δx; if not given none but courant's, or 0.0508 beside a "
-        "penalty_constant [-]",
-    )
-    adaptive_time_step: bool = Field(
-        default=True, description="take a smaller time step where the stability law asks for it"
-    )
-    adaptive_until: float | None = Field(
-        default=None,
-        gt=0,
-        description="time from which on every step is time_step all the same; never if not given [D/U]",
-    )
-    time_step_safety: float = Field(
-        default=0.9,
-        gt=0,
-        le=1,
-        description="fraction of the penalty's stability law that a step beside a penalty_constant takes [-]",
-    )
-    algorithm: Literal["midpoint", 1, 2, "original"] = Field(
-        default="midpoint",
-        description="derivatives in the middle of the step, of second order in time; the paper's at updated (1) or "
-        "initial positions (2); or 1 with a search in every iteration",
-    )
-    max_iterations: int = Field(default=2, ge=1, le=1000, description="cap of the inner iterations of a step [-]")
-    projection_sweeps: int = Field(
-        default=4, ge=0, le=1000, description="projection sweeps after the iterations of a step, 0 in the paper [-]"
-    )
-    sweep_weights: Literal["chebyshev", "equal"] | None = Field(
-        default=None,
-        description="how far each sweep goes; if not given chebyshev, or equal beside a penalty_constant",
-    )
-    tolerance: float = Field(default=1e-3, gt=0, description="largest |∇·u| at which the iterations end, ε [U/D]")
-    penalty_constant: float | None = Field(
-        default=None,
-        ge=1,
-        le=100,
-        description="penalty constant C_BV = (c/u_max)²; if not given it follows the step, or is 100 beside "
-        "a time_step without courant [-]",
-    )
-    smoothing_ratio: float = Field(
-        default=4 / 3, ge=1, le=2, description="smoothing length over particle spacing, h/Δx [-]"
-    )
-    kernel: Literal["quintic_spline", "wendland_c2", "wendland_c4"] = Field(
-        default="quintic_spline", description="smoothing kernel; support 3h, 2h, 2h"
-    )
-    velocity_laplacian: Literal["scalar", "vector"] = Field(
-        default="scalar", description="viscous term per component, or eq. (16) as printed"
-    )
-    laplacian_correction: bool = Field(
-        default=True, description="make the scalar Laplacians vanish for linear fields on any particle arrangement"
-    )
-    viscous_order: Literal[2, 4] = Field(
-        default=4,
-        description="order of the viscous term in Δx: the compact Laplacian's own, 2, or without its leading error",
-    )
-    viscous_theta: float | None = Field(
-        default=None,
-        ge=0.5,
-        le=1,
-        description="weight of the new velocity in the viscous term, 1/2 of second order in time, 1 in the paper; if "
-        "not given 1/2, or 1 beside a penalty_constant [-]",
-    )
-    shifting: Literal["strain", "xsph", "maximum_velocity", "none"] = Field(
-        default="strain",
-        description="particle shifting: eq. (18) with β times how fast the flow strains a neighbourhood, with the XSPH "
-        "velocity as in the paper, with β u_max, or none",
-    )
-    shift_coefficient: float | None = Field(
-        default=None,
-        ge=0,
-        le=1,
-        description="β of the shifting; if not given 0.75 of strain in 2-D, 0.25 in 3-D; 0.04 of "
-        "maximum_velocity [-]",
-    )
-    shift_limit: float = Field(default=0.1, gt=0, le=0.5, description="largest shift in a step [Δx]")
-    wall_velocity: Literal["paper", "adami", "morris", "cubic"] = Field(
-        default="cubic",
-        description="velocity of solid particles in the viscous term: the body's own, or extrapolated for no-slip",
-    )
-    wall_pressure: Literal["paper", "adami", "linear"] = Field(
-        default="linear",
-        description="pressure of solid particles: eqs. (10) and (20), or that of the fluid around, constant or linear",
-    )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _what_follows_from_others(cls, values: dict[str, Any]) -> dict[str, Any]:
-        if values.get("shift_coefficient") is None:
-            strain = 0.25 if values.get("dimensions") == 3 else 0.75  # in 3-D more neighbours push
-            kind = values.get("shifting")
-            values = values | {"shift_coefficient": strain if kind in (None, "strain") else 0.04}
-        if values.get("courant") is not None:
-            if values.get("penalty_constant") is not None:
-                raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")
-            return values
-        if not _as_in_the_paper(values):
-            return values | {"courant": COURANT}
-        return values | {name: value for name, value in PAPER.items() if values.get(name) is None}
-
-    def replace(self, **changes: Any) -> Self:
-        """Return a case with some parameters changed; see `superseded`."""
-        return super().replace(**dict.fromkeys(superseded(changes)) | changes)
 
     @classmethod
     def parameter_names(cls) -> list[str]:
         """Return the names of the parameters, those of the problem before those of the numerical method."""
-        numerical = Case.model_fields.keys() - {"reynolds", "resolution"}
-        return sorted(cls.model_fields, key=lambda name: name in numerical)
+        return sorted(cls.model_fields, key=lambda name: name in Method.model_fields)
 
     @property
     @abstractmethod
@@ -338,25 +199,9 @@ class Case(Parameters):
         """Particle spacing Δx [D]."""
         return 1.0 / self.resolution
 
-    @property
-    def support_layers(self) -> int:
-        """Support radius in particle spacings, rounded up."""
-        return math.ceil(SUPPORT[self.kernel] * self.smoothing_ratio - 1e-9)
-
-    @property
-    def buffer_columns(self) -> int:
-        """Length of the inlet and outlet buffers, 6h, in particle spacings."""
-        return math.ceil(6 * self.smoothing_ratio - 1e-9)
-
     def settings(self) -> dict[str, Any]:
         """Return the engine's settings (see docs/architecture.md)."""
-        follows = self.courant is not None
-        shared = (
-            "smoothing_ratio kernel adaptive_time_step adaptive_until time_step_safety max_iterations "
-            "projection_sweeps penalty_constant velocity_laplacian laplacian_correction viscous_order shifting "
-            "shift_coefficient shift_limit wall_velocity wall_pressure"
-        )
-        return {name: getattr(self, name) for name in shared.split()} | {
+        return self.method_settings() | {
             "dimensions": self.space_dimensions,
             "velocity_limit": VELOCITY_LIMIT,
             "particle_spacing": self.particle_spacing,
@@ -364,12 +209,6 @@ class Case(Parameters):
             "kinematic_viscosity": self.kinematic_viscosity,
             "body_force": self.body_force(),
             "time_step": self.largest_time_step * self.particle_spacing,
-            "courant": self.courant,
-            "viscous_theta": self.viscous_theta or (0.5 if follows else 1.0),
-            "sweep_weights": self.sweep_weights or ("chebyshev" if follows else "equal"),
-            "derivative_frame": {2: "initial", "midpoint": "midpoint"}.get(self.algorithm, "updated"),
-            "search_every_iteration": self.algorithm == "original",
-            "divergence_tolerance": self.tolerance,
             "domain": self.domain(),
             "bodies": self.bodies(),
         }
