@@ -6,6 +6,9 @@ import time
 
 import alsph
 import numpy as np
+from alsph.cases.cavity import CENTRE_LINES
+from alsph.geometry import Kind
+from alsph.sampling import interpolate
 from scipy.spatial import cKDTree
 
 
@@ -57,14 +60,15 @@ else:
         options.until or 1.0,
     )
 simulation = case.simulation(threads=1)
-line, middle = np.linspace(0, 1, 201), np.full(201, 0.5)
 cpu, late = [], []
 while simulation.time < until if until else len(cpu) < WARM_UP + options.steps:
     simulation.advance(1)
     cpu.append(time.process_time())
     if options.case == "cavity" and simulation.time >= until - options.window + len(late) / 4:
-        points = np.column_stack([np.r_[middle, line], np.r_[line, middle]])
-        late.append(simulation.sample(points)["velocity"])
+        state = simulation.snapshot()
+        fluid = state["kind"] == Kind.FLUID
+        fields = state["position"][fluid], state["velocity"][fluid]
+        late.append(interpolate(*fields, CENTRE_LINES, case.particle_spacing)[0])
         cpu = [before + time.process_time() - cpu[-1] for before in cpu]  # as if it had taken no time
 history, state = simulation.history(), simulation.snapshot()
 position = state["position"]
@@ -78,8 +82,8 @@ elif options.case == "cavity":
     count = cKDTree(position).count_neighbors(
         cKDTree(position), 3 * case.smoothing_ratio / case.resolution * (1 + 5e-7)
     )
-    u, v = np.mean(late, axis=0)[:201, 0], np.mean(late, axis=0)[201:, 1]
-    result["extrema"] = [float(u.min()), float(v.max()), float(v.min())]
+    u, v = np.split(np.mean(late, axis=0), 2)
+    result["extrema"] = [float(u[:, 0].min()), float(v[:, 1].max()), float(v[:, 1].min())]
 else:
     radius = 3 * case.smoothing_ratio / case.resolution * (1 + 5e-7)
     tree = cKDTree(position % 1, boxsize=1)

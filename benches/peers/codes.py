@@ -11,10 +11,12 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 ENVIRONMENTS = HERE / "environments"
 
+ALSPH = str(HERE.parents[1])
+
 # Name: interpreter, packages, driver.
 CODES = {
-    "alsph": (sys.executable, [str(HERE.parents[1]), "scipy"], "alsph_peer.py"),
-    "pysph": (sys.executable, ["pysph==1.0b2", "scipy", "matplotlib"], "pysph_peer.py"),
+    "alsph": (sys.executable, [ALSPH], "alsph_peer.py"),
+    "pysph": (sys.executable, ["pysph==1.0b2", ALSPH], "pysph_peer.py"),
     "jax-sph": ("python3.10", ["jax-sph==0.1.0", "scipy"], "jax_sph_peer.py"),
 }
 

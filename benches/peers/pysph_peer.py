@@ -7,9 +7,10 @@ import json
 import time
 
 import numpy as np
+from alsph.cases.cavity import CENTRE_LINES
+from alsph.sampling import interpolate
 from pysph.examples import cavity, flow_past_cylinder_2d, taylor_green
 from pysph.solver.utils import iter_output
-from pysph.tools.interpolator import Interpolator
 from scipy.spatial import cKDTree
 
 
@@ -102,15 +103,14 @@ def errors(fluid, time):
 
 def extrema(app, start):
     """Return the smallest u and the largest and smallest v on the centre lines, of the mean of the late outputs."""
-    line, middle = np.linspace(0, 1, 201), np.full(201, 0.5)
-    u, v = [], []
+    late = []
     for data, arrays in iter_output(app.output_files):
         if data["t"] >= start:
-            sources = list(arrays.values())
-            u.append(Interpolator(sources, x=middle, y=line, method="order1").interpolate("u"))
-            v.append(Interpolator(sources, x=line, y=middle, method="order1").interpolate("v"))
-    u, v = np.mean(u, axis=0), np.mean(v, axis=0)
-    return [float(u.min()), float(v.max()), float(v.min())]
+            fluid = arrays["fluid"]
+            position, velocity = np.column_stack([fluid.x, fluid.y]), np.column_stack([fluid.u, fluid.v])
+            late.append(interpolate(position, velocity, CENTRE_LINES, app.dx)[0])
+    u, v = np.split(np.mean(late, axis=0), 2)
+    return [float(u[:, 0].min()), float(v[:, 1].max()), float(v[:, 1].min())]
 
 
 def forces(app, start):

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 
 BOX = shapely.box(0, 0, 1, 1)
 LINE = np.linspace(0, 1, 401)[1:-1]
+CENTRE_LINES = np.concatenate(
+    [np.stack([np.full_like(LINE, 0.5), LINE], 1), np.stack([LINE, np.full_like(LINE, 0.5)], 1)]
+)
+"""Points (m, 2) on the vertical centre line, then as many on the horizontal one [D]."""
 SOURCE = "independent high-order solution (alsph/reference)"
 
 
@@ -108,6 +112,5 @@ class Cavity(Case):
     @staticmethod
     def _centre_lines(run: Run) -> tuple[FloatArray, FloatArray]:
         """Return u at x = D/2 and v at y = D/2 along `LINE`."""
-        middle = np.full_like(LINE, 0.5)
-        velocity = sampling.late_velocity(run, np.stack([np.r_[middle, LINE], np.r_[LINE, middle]], axis=1))
-        return velocity[: len(LINE), 0], velocity[len(LINE) :, 1]
+        vertical, horizontal = np.split(sampling.late_velocity(run, CENTRE_LINES), 2)
+        return vertical[:, 0], horizontal[:, 1]
