@@ -105,9 +105,11 @@ def plot(path: Path) -> None:
             axes.loglog(cost, errors, VARIANTS[variant][2], ms=5, lw=1, label=NAMES[variant])
             for row, x, y in zip(found, cost, errors, strict=True):
                 axes.annotate(f"{row['resolution']}", (x, y), textcoords="offset points", xytext=(4, 4), fontsize=7)
-        axes.set(title=title, xlabel="CPU s a unit of flow time, one core", ylabel="error [%]")
+        axes.set_title(title, fontsize=10)
+        axes.set(xlabel="CPU s a unit of flow time, one core", ylabel="error [%]")
         axes.grid(alpha=0.3, which="both")
-    figure.axes[0].legend(fontsize=8)
+    handles, names = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=len(names), fontsize=8)
     plotting.save(figure, path)
 
 
