@@ -16,6 +16,7 @@ from alsph import plotting, reference
 from alsph.tables import markdown
 from codes import ENVIRONMENTS, HERE, measure
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 ROWS = HERE / "curve.jsonl"
 PICTURE = HERE.parents[1] / "docs" / "images" / "cost_error.png"
@@ -108,6 +109,9 @@ def plot(path: Path) -> None:
         axes.set_title(title, fontsize=10)
         axes.set(xlabel="CPU s a unit of flow time, one core", ylabel="error [%]")
         axes.grid(alpha=0.3, which="both")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter("{x:g}")
+            axis.set_minor_formatter(NullFormatter())
     handles, names = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=len(names), fontsize=8)
     plotting.save(figure, path)
