@@ -68,7 +68,7 @@ def main() -> None:
     parser.add_argument("--resolutions", type=int, nargs="+", default=[25])
     parser.add_argument("--until", type=float, default=1.0)
     parser.add_argument("--reynolds", type=float)
-    parser.add_argument("--settings", nargs="+", default=["default", "courant=0.3"])
+    parser.add_argument("--settings", nargs="+", default=["default"])
     options = parser.parse_args()
     parameters = {"reynolds": options.reynolds} if options.reynolds else {}
     rows = []
