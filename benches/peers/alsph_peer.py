@@ -6,7 +6,7 @@ import time
 
 import alsph
 import numpy as np
-from alsph.cases.cavity import CENTRE_LINES
+from alsph.cases.cavity import CENTRE_LINES, on_centre_lines
 from alsph.geometry import Kind
 from alsph.sampling import interpolate
 from scipy.spatial import cKDTree
@@ -21,9 +21,8 @@ def passes(case, iterations):
     return 4 + iterating + 2 * case.projection_sweeps + sharpening
 
 
-def channel_pairs(case, position):
+def channel_pairs(case, position, radius):
     """Count the directed pairs of the channel's particles, images across the walls included."""
-    radius = 3 * case.smoothing_ratio / case.resolution * (1 + 5e-7)
     plane = case.height / 2
     images = [position]
     for side in (-plane, plane):
@@ -60,32 +59,31 @@ else:
         options.until or 1.0,
     )
 simulation = case.simulation(threads=1)
-cpu, late = [], []
+cpu, late, sampling = [], [], 0.0
 while simulation.time < until if until else len(cpu) < WARM_UP + options.steps:
     simulation.advance(1)
-    cpu.append(time.process_time())
+    cpu.append(time.process_time() - sampling)
     if options.case == "cavity" and simulation.time >= until - options.window + len(late) / 4:
         state = simulation.snapshot()
         fluid = state["kind"] == Kind.FLUID
         fields = state["position"][fluid], state["velocity"][fluid]
         late.append(interpolate(*fields, CENTRE_LINES, case.particle_spacing)[0])
-        cpu = [before + time.process_time() - cpu[-1] for before in cpu]  # as if it had taken no time
+        sampling = time.process_time() - cpu[-1]
 history, state = simulation.history(), simulation.snapshot()
 position = state["position"]
+radius = 3 * case.smoothing_ratio / case.resolution * (1 + 5e-7)
 if options.case == "cylinder":
-    count = channel_pairs(case, position)
+    count = channel_pairs(case, position, radius)
     if until:
-        late = history["time"] >= until - options.window
-        result |= {"drag": float(np.mean(history["drag_coefficient"][late]))}
-        result |= {"lift": float(np.std(history["lift_coefficient"][late]))}
+        window = history["time"] >= until - options.window
+        result["drag"] = float(np.mean(history["drag_coefficient"][window]))
+        result["lift"] = float(np.std(history["lift_coefficient"][window]))
 elif options.case == "cavity":
-    count = cKDTree(position).count_neighbors(
-        cKDTree(position), 3 * case.smoothing_ratio / case.resolution * (1 + 5e-7)
-    )
-    u, v = np.split(np.mean(late, axis=0), 2)
-    result["extrema"] = [float(u[:, 0].min()), float(v[:, 1].max()), float(v[:, 1].min())]
+    tree = cKDTree(position)
+    count = tree.count_neighbors(tree, radius)
+    u, v = on_centre_lines(np.mean(late, axis=0))
+    result["extrema"] = [float(u.min()), float(v.max()), float(v.min())]
 else:
-    radius = 3 * case.smoothing_ratio / case.resolution * (1 + 5e-7)
     tree = cKDTree(position % 1, boxsize=1)
     count = tree.count_neighbors(tree, radius)
     rate = -8 * np.pi**2 / case.reynolds

@@ -7,7 +7,7 @@ import json
 import time
 
 import numpy as np
-from alsph.cases.cavity import CENTRE_LINES
+from alsph.cases.cavity import CENTRE_LINES, on_centre_lines
 from alsph.sampling import interpolate
 from pysph.examples import cavity, flow_past_cylinder_2d, taylor_green
 from pysph.solver.utils import iter_output
@@ -109,8 +109,8 @@ def extrema(app, start):
             fluid = arrays["fluid"]
             position, velocity = np.column_stack([fluid.x, fluid.y]), np.column_stack([fluid.u, fluid.v])
             late.append(interpolate(position, velocity, CENTRE_LINES, app.dx)[0])
-    u, v = np.split(np.mean(late, axis=0), 2)
-    return [float(u[:, 0].min()), float(v[:, 1].max()), float(v[:, 1].min())]
+    u, v = on_centre_lines(np.mean(late, axis=0))
+    return [float(u.min()), float(v.max()), float(v.min())]
 
 
 def forces(app, start):

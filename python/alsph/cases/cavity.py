@@ -24,6 +24,14 @@ CENTRE_LINES = np.concatenate(
     [np.stack([np.full_like(LINE, 0.5), LINE], 1), np.stack([LINE, np.full_like(LINE, 0.5)], 1)]
 )
 """Points (m, 2) on the vertical centre line, then as many on the horizontal one [D]."""
+
+
+def on_centre_lines(velocity: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return u on the vertical and v on the horizontal centre line, of velocities (m, 2) at `CENTRE_LINES`."""
+    vertical, horizontal = np.split(velocity, 2)
+    return vertical[:, 0], horizontal[:, 1]
+
+
 SOURCE = "independent high-order solution (alsph/reference)"
 
 
@@ -112,5 +120,4 @@ class Cavity(Case):
     @staticmethod
     def _centre_lines(run: Run) -> tuple[FloatArray, FloatArray]:
         """Return u at x = D/2 and v at y = D/2 along `LINE`."""
-        vertical, horizontal = np.split(sampling.late_velocity(run, CENTRE_LINES), 2)
-        return vertical[:, 0], horizontal[:, 1]
+        return on_centre_lines(sampling.late_velocity(run, CENTRE_LINES))
