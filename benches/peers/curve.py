@@ -8,6 +8,7 @@ Rows are kept in curve.jsonl as they come, and those that are there are not run 
 """
 
 import argparse
+import itertools
 import json
 from pathlib import Path
 
@@ -21,30 +22,19 @@ from matplotlib.ticker import NullFormatter
 ROWS = HERE / "curve.jsonl"
 PICTURE = HERE.parents[1] / "docs" / "images" / "cost_error.png"
 
-# What the arguments of a driver are called in the picture, and how they are drawn.
+# What a way of computing is called, its driver and arguments, and how it is drawn.
 VARIANTS = {
-    "alsph": ("alsph", [], "C0o-"),
-    "paper": ("alsph", ["--paper"], "C2s-"),
-    "edac": ("pysph", ["--scheme=edac", "--cache", "--smoothing-ratio=1"], "C1^-"),
-    "sisph": ("pysph", ["--scheme=sisph", "--cache", "--smoothing-ratio=1"], "C3v-"),
+    "alsph": ("alsph", "alsph", [], "C0o-"),
+    "paper": ("the paper's Algorithm 2, in alsph", "alsph", ["--paper"], "C2s-"),
+    "edac": ("PySPH, EDAC", "pysph", ["--scheme=edac", "--cache", "--smoothing-ratio=1"], "C1^-"),
+    "sisph": ("PySPH, SISPH", "pysph", ["--scheme=sisph", "--cache", "--smoothing-ratio=1"], "C3v-"),
 }
-NAMES = {"alsph": "alsph", "paper": "the paper's Algorithm 2, in alsph", "edac": "PySPH, EDAC", "sisph": "PySPH, SISPH"}
 
-# Case: arguments, resolutions, variants, and what the error is of.
+# Case: end and window of the averages, resolutions, variants, and what the error is of.
 CASES = {
-    "taylor_green": (
-        ["--until=1"],
-        [25, 50, 100],
-        ["alsph", "paper", "edac", "sisph"],
-        "Taylor-Green, Re = 100: velocity",
-    ),
-    "cavity": (["--until=20"], [25, 50, 100], ["alsph", "paper", "edac"], "cavity, Re = 100: worst extremum"),
-    "cylinder": (
-        ["--until=40", "--window=15"],
-        [10, 15, 20, 30],
-        ["alsph", "paper", "edac"],
-        "cylinder, Re = 200: drag",
-    ),
+    "taylor_green": (1.0, 1.0, [25, 50, 100], list(VARIANTS), "Taylor-Green, Re = 100: velocity"),
+    "cavity": (20.0, 5.0, [25, 50, 100], ["alsph", "paper", "edac"], "cavity, Re = 100: worst extremum"),
+    "cylinder": (40.0, 15.0, [10, 15, 20, 30], ["alsph", "paper", "edac"], "cylinder, Re = 200: drag"),
 }
 
 
@@ -66,44 +56,46 @@ def read() -> dict[tuple[str, str, int], dict]:
     return {(row["case"], row["variant"], row["resolution"]): row for row in map(json.loads, lines)}
 
 
+def likely(rows: dict[tuple[str, str, int], dict], case: str, variant: str, resolution: int) -> float:
+    """Return the CPU time to expect of a run by the next coarser one [s]; 0 if there is none."""
+    coarser = [row for (*flow, n), row in rows.items() if flow == [case, variant] and n < resolution]
+    if not coarser:
+        return 0.0
+    row = max(coarser, key=lambda row: row["resolution"])
+    return row["cpu_per_time"] * row["until"] * (resolution / row["resolution"]) ** 3
+
+
 def run(cases: list[str], most: float, folder: Path) -> None:
-    """Run what is missing, the cheap before the dear."""
+    """Run what is missing, the coarse before the fine."""
     for case in cases:
-        arguments, resolutions, variants, _ = CASES[case]
-        for resolution in resolutions:
-            for variant in variants:
-                rows = read()
-                before = rows.get((case, variant, resolutions[max(0, resolutions.index(resolution) - 1)]))
-                likely = (
-                    before["cpu_per_time"] * before["until"] * (resolution / before["resolution"]) ** 3 if before else 0
-                )
-                if (case, variant, resolution) in rows or likely > most:
-                    continue
-                name, more, _ = VARIANTS[variant]
-                result = measure(name, [case, f"--resolution={resolution}", *arguments, *more], folder)
-                if result is None:
-                    continue
-                until = float(arguments[0].partition("=")[2])
-                row = {"case": case, "variant": variant, "resolution": resolution, "until": until} | result
-                with ROWS.open("a") as file:
-                    file.write(json.dumps(row) + "\n")
-                print(
-                    f"{case} {variant} {resolution}: {row['cpu_per_time']:.3g} s, error {error(case, row):.3%}",
-                    flush=True,
-                )
+        until, window, resolutions, variants, _ = CASES[case]
+        for resolution, variant in itertools.product(resolutions, variants):
+            rows = read()
+            if (case, variant, resolution) in rows or likely(rows, case, variant, resolution) > most:
+                continue
+            _, code, more, _ = VARIANTS[variant]
+            arguments = [case, f"--resolution={resolution}", f"--until={until}", f"--window={window}", *more]
+            result = measure(code, arguments, folder)
+            if result is None:
+                continue
+            row = {"case": case, "variant": variant, "resolution": resolution, "until": until} | result
+            with ROWS.open("a") as file:
+                file.write(json.dumps(row) + "\n")
+            cost = f"{row['cpu_per_time']:.3g} s"
+            print(f"{case} {variant} {resolution}: {cost}, error {error(case, row):.3%}", flush=True)
 
 
 def plot(path: Path) -> None:
     """Draw the errors over the cost, a panel a case."""
     rows = read()
     figure = Figure(figsize=(10, 3.6), layout="constrained")
-    for axes, (case, (_, resolutions, variants, title)) in zip(
+    for axes, (case, (_, _, resolutions, variants, title)) in zip(
         figure.subplots(1, len(CASES)), CASES.items(), strict=True
     ):
         for variant in variants:
             found = [rows[case, variant, n] for n in resolutions if (case, variant, n) in rows]
             cost, errors = [row["cpu_per_time"] for row in found], [100 * error(case, row) for row in found]
-            axes.loglog(cost, errors, VARIANTS[variant][2], ms=5, lw=1, label=NAMES[variant])
+            axes.loglog(cost, errors, VARIANTS[variant][3], ms=5, lw=1, label=VARIANTS[variant][0])
             for row, x, y in zip(found, cost, errors, strict=True):
                 axes.annotate(f"{row['resolution']}", (x, y), textcoords="offset points", xytext=(4, 4), fontsize=7)
         axes.set_title(title, fontsize=10)
@@ -129,7 +121,7 @@ def main() -> None:
     if not options.plot:
         run(options.cases, options.most, options.environments.resolve())
     cells = [
-        [case, NAMES[variant], str(n), f"{row['cpu_per_time']:.3g}", f"{100 * error(case, row):.2g} %"]
+        [case, VARIANTS[variant][0], str(n), f"{row['cpu_per_time']:.3g}", f"{100 * error(case, row):.2g} %"]
         for (case, variant, n), row in sorted(read().items())
     ]
     print(markdown(["case", "code", "resolution", "CPU s a unit of flow time", "error"], cells))
