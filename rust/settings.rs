@@ -67,6 +67,16 @@ pub enum SweepWeights {
     Chebyshev,
 }
 
+/// What the pressure keeps of the projection sweeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SweepPressure {
+    /// Its share as it is.
+    Rough,
+    /// Its share without the shortest waves, of which the gradient sees next to nothing.
+    Smooth,
+}
+
 /// Velocity that a solid particle shows to the viscous term of a fluid neighbour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -163,6 +173,7 @@ pub struct Settings {
     /// Projection sweeps after the iterations of a step; none in the paper.
     pub projection_sweeps: usize,
     pub sweep_weights: SweepWeights,
+    pub sweep_pressure: SweepPressure,
     /// ε of (13), 1/time.
     pub divergence_tolerance: f64,
     /// C_BV, as in the paper; if not given r_AL Δt λ_max is 1, whatever the step.

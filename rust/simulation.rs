@@ -144,7 +144,8 @@ impl<const D: usize> Simulation<D> {
         self.prepare_step(Travel { time_step, velocity_max, fraction: self.settings.derivative_frame.fraction() });
         let penalty = self.settings.penalty(velocity_max, time_step, self.largest_eigenvalue);
         let (relaxation, dispersion) = (self.relaxation, self.dispersion);
-        let step = Step { settings: &self.settings, time_step, penalty, relaxation, dispersion };
+        let shortest = self.settings.particle_spacing.powi(2) / self.largest_eigenvalue;
+        let step = Step { settings: &self.settings, time_step, penalty, relaxation, dispersion, shortest };
 
         let iterations = self.scheme.iterate(step, &mut self.particles, &mut self.frame, &mut self.walls);
         if let Some(symptom) = breakdown::find(step.settings, &self.particles, &self.frame, time_step) {

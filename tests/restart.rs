@@ -9,7 +9,7 @@ mod common;
 
 /// What a configuration chooses, and what from. The first two say what closes the sides, the third whether the body moves, the rest
 /// are settings.
-const FACTORS: [(&str, &[&str]); 16] = [
+const FACTORS: [(&str, &[&str]); 17] = [
     (
         "layout",
         &[
@@ -35,6 +35,7 @@ const FACTORS: [(&str, &[&str]); 16] = [
     ("laplacian_correction", &["true", "false"]),
     ("projection_sweeps", &["0", "3"]),
     ("sweep_weights", &["equal", "chebyshev"]),
+    ("sweep_pressure", &["rough", "smooth"]),
     ("penalty_constant", &["100.0", "null"]),
     ("viscous_theta", &["1.0", "0.5"]),
     ("kernel", &["quintic_spline", "wendland_c2", "wendland_c4"]),

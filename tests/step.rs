@@ -6,7 +6,7 @@ use alsph::kernel::{QuinticSpline, Smoothing};
 use alsph::neighbours::Grid;
 use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient};
 use alsph::scheme::{Alsph, Outcome, Step, relaxation};
-use alsph::settings::{SweepWeights, WallPressure};
+use alsph::settings::{SweepPressure, SweepWeights, WallPressure};
 use alsph::shifting::shift;
 use alsph::{Clock, Matrix, ParticleKind, Particles, Settings, Simulation, Vector};
 use approx::assert_relative_eq;
@@ -156,6 +156,7 @@ fn equations(settings: &Settings, set: &Set<2>) -> (Vec<Vector<2>>, Vec<f64>) {
                 SweepWeights::Equal => [1.0, 1.0],
                 SweepWeights::Chebyshev => [0.6 + 0.4 * 0.5f64.sqrt(), 0.6 - 0.4 * 0.5f64.sqrt()],
             };
+            let before = pressure.clone();
             for zero in &zeros[..settings.projection_sweeps] {
                 let relaxation = spacing.powi(2) / (1.1 * zero * settings.largest_projection_eigenvalue());
                 let divergence = set.apply(Divergence(&velocity));
@@ -169,6 +170,13 @@ fn equations(settings: &Settings, set: &Set<2>) -> (Vec<Vector<2>>, Vec<f64>) {
                 // The pressure keeps a half of each sweep.
                 pressure = scalars(set, |i| pressure[i] - 0.5 * rho * relaxation / dt * divergence[i]);
             }
+            if settings.sweep_pressure == SweepPressure::Smooth {
+                // Of a wave with an eigenvalue λ of the compact Laplacian 1 − λ/λ_max is left.
+                let kept: Vec<_> = pressure.iter().zip(&before).map(|(after, before)| [0.0, after - before]).collect();
+                let laplacian = set.apply(GradientAndLaplacian(&kept));
+                let shortest = spacing.powi(2) / settings.largest_laplacian_eigenvalue();
+                pressure = scalars(set, |i| pressure[i] + if is_fluid(i) { shortest * laplacian[i].1 } else { 0.0 });
+            }
         }
     }
     (velocity, pressure)
@@ -176,9 +184,9 @@ fn equations(settings: &Settings, set: &Set<2>) -> (Vec<Vector<2>>, Vec<f64>) {
 
 #[test]
 fn a_step_is_that_of_the_equations() {
-    let paper = [json!(60.0), json!(1.0), json!("equal"), json!(4)];
-    let second_order = [Value::Null, json!(0.5), json!("chebyshev"), json!(4)];
-    let mixed = [Value::Null, json!(0.7), json!("equal"), json!(2)];
+    let paper = [json!(60.0), json!(1.0), json!("equal"), json!("rough"), json!(4)];
+    let second_order = [Value::Null, json!(0.5), json!("chebyshev"), json!("smooth"), json!(4)];
+    let mixed = [Value::Null, json!(0.7), json!("equal"), json!("smooth"), json!(2)];
     for (frame, chosen) in [
         ("initial", &paper),
         ("midpoint", &paper),
@@ -187,8 +195,8 @@ fn a_step_is_that_of_the_equations() {
         ("midpoint", &mixed),
     ] {
         let mut value = settings(frame);
-        for (key, chosen) in ["penalty_constant", "viscous_theta", "sweep_weights", "viscous_order"].into_iter().zip(chosen)
-        {
+        let keys = ["penalty_constant", "viscous_theta", "sweep_weights", "sweep_pressure", "viscous_order"];
+        for (key, chosen) in keys.into_iter().zip(chosen) {
             value[key] = chosen.clone();
         }
         let settings = common::parse(&value);
@@ -210,9 +218,11 @@ fn a_step_is_that_of_the_equations() {
 /// The same between an inlet and an outlet, past a cylinder whose surface slides, by each rule for the pressure of solids.
 #[test]
 fn a_step_past_a_body_is_that_of_the_equations() {
-    for (frame, wall_pressure) in [("initial", "paper"), ("initial", "adami"), ("midpoint", "linear")] {
+    let rules = [("initial", "paper", "rough"), ("initial", "adami", "rough"), ("midpoint", "linear", "smooth")];
+    for (frame, wall_pressure, sweep_pressure) in rules {
         let mut value = settings(frame);
         (value["wall_pressure"], value["viscous_order"]) = (wall_pressure.into(), 2.into());
+        value["sweep_pressure"] = sweep_pressure.into();
         value["domain"]["boundaries"] = json!([["inlet", "outlet"], ["periodic", "periodic"]]);
         value["bodies"][0]["velocity"] = json!([0.3, 0.1]);
         let settings = common::parse(&value);
@@ -253,15 +263,16 @@ fn with_buffers(particles: &mut Particles<2>) {
 /// divergence it leaves.
 #[test]
 fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
-    for sweeps in [0, 3] {
+    for (sweeps, kept) in [(0, "rough"), (3, "rough"), (3, "smooth")] {
         let mut value = settings("initial");
-        value["projection_sweeps"] = json!(sweeps);
+        (value["projection_sweeps"], value["sweep_pressure"]) = (json!(sweeps), kept.into());
         value["kinematic_viscosity"] = json!(1e-15);
         value["body_force"] = json!([0.0, 0.0]);
         let settings = common::parse(&value);
         let Set { mut particles, mut frame } = first_frame(&settings, box_of_fluid());
         let (penalty, relaxation) = (0.05, relaxation(&settings));
-        let step = Step { settings: &settings, time_step: TIME_STEP, penalty, relaxation, dispersion: 0.0 };
+        let shortest = 0.3 * settings.particle_spacing.powi(2);
+        let step = Step { settings: &settings, time_step: TIME_STEP, penalty, relaxation, dispersion: 0.0, shortest };
         let mut scheme = Alsph::default();
         // A second step in the same frame has nothing of the first.
         for _ in 0..2 {
@@ -297,7 +308,7 @@ fn at_rest_the_pressure_acts_as_it_is() {
     start.pressure.fill(2.5);
     let Set { mut particles, mut frame } = first_frame(&settings, start);
     let (penalty, relaxation) = (0.05, relaxation(&settings));
-    let step = Step { settings: &settings, time_step: TIME_STEP, penalty, relaxation, dispersion: 0.0 };
+    let step = Step { settings: &settings, time_step: TIME_STEP, penalty, relaxation, dispersion: 0.0, shortest: 0.0 };
     let mut scheme = Alsph::default();
     scheme.iterate(step, &mut particles, &mut frame, &mut Walls::new(&settings));
     for i in 0..particles.real {

@@ -96,13 +96,14 @@ def test_the_courant_number_and_the_pair_of_the_paper_take_the_place_of_one_anot
         return case.courant, case.time_step, case.penalty_constant
 
     def engine(case):
-        return [case.settings()[name] for name in ("courant", "penalty_constant", "viscous_theta", "sweep_weights")]
+        names = ("courant", "penalty_constant", "viscous_theta", "sweep_weights", "sweep_pressure")
+        return [case.settings()[name] for name in names]
 
     assert given(small) == given(small.replace(courant=None)) == (0.3, None, None)
-    assert engine(small) == [0.3, None, 0.5, "chebyshev"]
+    assert engine(small) == [0.3, None, 0.5, "chebyshev", "smooth"]
     paper = small.replace(penalty_constant=80.0)
     assert given(paper) == given(Cylinder(penalty_constant=80.0)) == (None, 0.0508, 80.0)
-    assert engine(paper) == [None, 80.0, 1.0, "equal"]
+    assert engine(paper) == [None, 80.0, 1.0, "equal", "rough"]
     assert paper.settings()["time_step"] == pytest.approx(0.0508 * small.particle_spacing)
     assert given(small.replace(time_step=0.04)) == given(Cylinder(time_step=0.04)) == (None, 0.04, 100.0)
     assert given(paper.replace(courant=0.2)) == (0.2, None, None)

@@ -26,8 +26,8 @@ PICTURE = HERE.parents[1] / "docs" / "images" / "cost_error.png"
 VARIANTS = {
     "alsph": ("alsph", "alsph", [], "C0o-"),
     "paper": ("the paper's Algorithm 2, in alsph", "alsph", ["--paper"], "C2s-"),
-    "edac": ("PySPH, EDAC", "pysph", ["--scheme=edac", "--cache", "--smoothing-ratio=1"], "C1^-"),
-    "sisph": ("PySPH, SISPH", "pysph", ["--scheme=sisph", "--cache", "--smoothing-ratio=1"], "C3v-"),
+    "edac": ("PySPH, EDAC", "pysph", ["--scheme=edac", "--cache"], "C1^-"),
+    "sisph": ("PySPH, SISPH", "pysph", ["--scheme=sisph", "--cache"], "C3v-"),
 }
 
 # Case: end and window of the averages, resolutions, variants, and what the error is of.

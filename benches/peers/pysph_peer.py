@@ -124,7 +124,7 @@ def forces(app, start):
 parser = argparse.ArgumentParser()
 parser.add_argument("case", choices=["cavity", "cylinder", "taylor_green"])
 parser.add_argument("--resolution", type=int, default=20)
-parser.add_argument("--smoothing-ratio", type=float, default=4 / 3)
+parser.add_argument("--smoothing-ratio", type=float, help="h/Δx, the example's if not given; the cavity's is fixed")
 parser.add_argument("--steps", type=int, default=20, help="steps to time, of the cylinder")
 parser.add_argument("--until", type=float, help="time to reach, D/U; for the cylinder in place of the steps")
 parser.add_argument("--window", type=float, default=5.0, help="length of the averages at the end, D/U")
@@ -134,18 +134,20 @@ parser.add_argument("--cache", action="store_true")
 options = parser.parse_args()
 
 WARM_UP = 5
+SMOOTHING_RATIO = {"cavity": cavity.hdx, "cylinder": 1.2, "taylor_green": 1.0}
 clock = Clock()
+smoothing_ratio = options.smoothing_ratio or SMOOTHING_RATIO[options.case]
 arguments = [f"--nx={options.resolution}", "--directory=output"]
 if options.case == "taylor_green":
     app, until = TaylorGreen(), options.until or 1.0
     arguments += [f"--scheme={options.scheme}", f"--tf={until}", f"--perturb={options.perturb}"]
-    arguments += [f"--hdx={options.smoothing_ratio}", "--pfreq=1000000"]
+    arguments += [f"--hdx={smoothing_ratio}", "--pfreq=1000000"]
 elif options.case == "cavity":
     app, until = Cavity(), options.until or 1.0
     arguments += [f"--scheme={options.scheme}", f"--tf={until}"]
 else:
     app, until = Cylinder(), options.until
-    arguments.append(f"--hdx={options.smoothing_ratio}")
+    arguments.append(f"--hdx={smoothing_ratio}")
     arguments += [f"--tf={1.2 * until}"] if until else [f"--max-steps={WARM_UP + options.steps}", "--disable-output"]
 if options.cache:
     arguments.append("--cache-nnps")
@@ -160,7 +162,7 @@ result = {
     + (", cached neighbours" if options.cache else "")
     + (", perturbed" if options.perturb else ""),
     "particles": sum(int(np.sum(array.tag == 0)) for array in solver.particles),
-    "smoothing_ratio": options.smoothing_ratio,
+    "smoothing_ratio": smoothing_ratio,
     "neighbours": pairs(solver, "fluid", "fluid", period) / np.sum(fluid.tag == 0) - 1,
     "cpu_per_step": float(np.median(np.diff(clock.cpu[WARM_UP - 1 :]))),
     "cpu_per_time": (clock.cpu[-1] - clock.cpu[0]) / (clock.time[-1] - clock.time[0]) * unit,

@@ -92,6 +92,8 @@ pub struct Step<'a> {
     pub relaxation: f64,
     /// The error of the compact Laplacian of a wave over its square wave number, a length squared.
     pub dispersion: f64,
+    /// One over the largest eigenvalue of the compact Laplacian, a length squared: so much of it takes the shortest waves off.
+    pub shortest: f64,
 }
 
 impl<const D: usize> Alsph<D> {

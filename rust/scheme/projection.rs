@@ -11,22 +11,23 @@
 //! 1 − σ λ, λ being the eigenvalue of −∇·∇. These reach a fifth of the compact Laplacian's: σ is five times as large and the
 //! sweep needs two passes over the neighbours, not four.
 //!
+//! What the gradient does not see of a sweep's potential, the shortest waves, does nothing to u, comes again in every step and would make p as rough:
+//! of the potential of all sweeps the pressure keeps what is left when the compact Laplacian, which sees them best, has taken them off.
+//!
 //! One σ for all sweeps is best for the shortest waves alone. Sweeps of different σ multiply to a polynomial of λ; that of Chebyshev on
 //! [a λ_max, λ_max] leaves least of all those waves, at the same cost.
 
 use crate::boundary::{deep_in_inlet, extrapolate};
 use crate::frame::Frame;
-use crate::operators::{Divergence, Gradient};
+use crate::operators::{Divergence, Gradient, GradientAndLaplacian};
+use crate::parallel;
 use crate::particles::{ParticleKind, Particles};
 use crate::scheme::{Derived, Step};
-use crate::settings::{Settings, SweepWeights};
+use crate::settings::{Settings, SweepPressure, SweepWeights};
 
 /// κ: the share of a sweep's potential that the pressure keeps. The rest of it is mostly noise of the one step; all of the
 /// pressure comes in over a few steps.
 const PRESSURE_SHARE: f64 = 0.5;
-
-/// What acts of a sweep's potential and is not kept, over what is.
-const UNKEPT: f64 = (1.0 - PRESSURE_SHARE) / PRESSURE_SHARE;
 
 /// a: the smallest eigenvalue that the polynomial of Chebyshev looks to, over the largest. With a tenth four sweeps go so far that
 /// disordered particles leave more ∇·u, not less.
@@ -49,6 +50,8 @@ pub struct Projection {
     divergence: Vec<f64>,
     /// p before the sweeps of this step; empty without any.
     pressure_before: Vec<f64>,
+    /// ∇·u before the last sweep, and what the pressure would keep of all sweeps, were it not made smooth; empty if it is not.
+    rough: Vec<[f64; 2]>,
 }
 
 /// The eigenvalue over the largest whose waves a sweep takes off: a zero of the polynomial.
@@ -66,11 +69,15 @@ fn weight(settings: &Settings, sweep: usize) -> f64 {
 impl Projection {
     pub fn begin(&mut self) {
         self.pressure_before.clear();
+        self.rough.clear();
     }
 
     /// What the sweeps of this step pushed with, and the pressure has not kept.
     pub fn unkept<const D: usize>(&self, particles: &Particles<D>, i: usize) -> f64 {
-        self.pressure_before.get(i).map_or(0.0, |before| UNKEPT * (particles.pressure[i] - before))
+        let Some(before) = self.pressure_before.get(i) else { return 0.0 };
+        let kept = particles.pressure[i] - before;
+        let share = self.rough.get(i).map_or(kept, |[_, rough]| *rough);
+        share / PRESSURE_SHARE - kept
     }
 
     /// All sweeps of one step. They take off what ∇·u has beyond [`Derived::solenoidal`].
@@ -82,7 +89,7 @@ impl Projection {
         derived: &[Derived<D>],
     ) {
         self.pressure_before.extend_from_slice(&particles.pressure);
-        let Step { settings, time_step, relaxation, .. } = step;
+        let Step { settings, time_step, relaxation, shortest, .. } = step;
         let Particles { real, kind, position, pressure, velocity, .. } = particles;
         let (kind, position) = (&kind[..*real], &*position);
         let deep_in_inlet = deep_in_inlet(settings);
@@ -96,13 +103,30 @@ impl Projection {
                 *out = if none { 0.0 } else { value - derived[i].solenoidal };
             });
             extrapolate(settings, frame, kind, divergence, |divergence, j, _| divergence[j]);
+            let is_last = sweep + 1 == settings.projection_sweeps;
             let (corrected, pressure) = (frame.images.real(velocity), frame.images.real(pressure));
-            frame.stencil.for_each(Gradient(divergence), corrected, pressure, |i, gradient, u, p| {
-                *p -= factor * divergence[i];
-                if kind[i] == ParticleKind::Fluid {
-                    *u += gradient * relaxation;
-                }
-            });
+            if is_last && settings.sweep_pressure == SweepPressure::Smooth {
+                let (rough, before) = (&mut self.rough, &self.pressure_before);
+                frame.images.blank(rough, divergence.len());
+                parallel::for_each(frame.images.real(rough), |i, rough| {
+                    *rough = [divergence[i], pressure[i] - factor * divergence[i] - before[i]];
+                });
+                frame.images.scalars(rough);
+                frame.stencil.for_each(GradientAndLaplacian(rough), corrected, pressure, |i, (gradient, laplacian), u, p| {
+                    *p -= factor * divergence[i];
+                    if kind[i] == ParticleKind::Fluid {
+                        *p += laplacian * shortest;
+                        *u += gradient * relaxation;
+                    }
+                });
+            } else {
+                frame.stencil.for_each(Gradient(divergence), corrected, pressure, |i, gradient, u, p| {
+                    *p -= factor * divergence[i];
+                    if kind[i] == ParticleKind::Fluid {
+                        *u += gradient * relaxation;
+                    }
+                });
+            }
             frame.images.vectors(velocity);
             frame.images.check(divergence, |_, value| value);
         }

@@ -18,7 +18,7 @@ pub fn settings_value<const D: usize>(particle_spacing: f64, boundary: &str) -> 
         "time_step": 0.05 * particle_spacing, "adaptive_time_step": true, "time_step_safety": 0.9,
         "derivative_frame": "initial", "search_every_iteration": false,
         "max_iterations": 5, "projection_sweeps": 0, "divergence_tolerance": 1e-3, "penalty_constant": 100.0,
-        "courant": null, "viscous_theta": 1.0, "sweep_weights": "equal",
+        "courant": null, "viscous_theta": 1.0, "sweep_weights": "equal", "sweep_pressure": "rough",
         "velocity_laplacian": "scalar", "laplacian_correction": true, "viscous_order": 2, "shifting": "xsph", "shift_coefficient": 0.04, "shift_limit": 0.1,
         "wall_velocity": "adami", "wall_pressure": "paper",
         "domain": {"lower": vec![0.0; D], "upper": vec![1.0; D], "boundaries": vec![[boundary; 2]; D]},

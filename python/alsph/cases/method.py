@@ -80,6 +80,11 @@ class Method(Parameters):
         default=None,
         description="how far each sweep goes; if not given chebyshev, or equal beside a penalty_constant",
     )
+    sweep_pressure: Literal["smooth", "rough"] | None = Field(
+        default=None,
+        description="what the pressure keeps of the sweeps, without the shortest waves or as it is; if not given "
+        "smooth, or rough beside a penalty_constant",
+    )
     tolerance: float = Field(default=1e-3, gt=0, description="largest |∇·u| at which the iterations end, ε [U/D]")
     penalty_constant: float | None = Field(
         default=None,
@@ -172,6 +177,7 @@ class Method(Parameters):
         return {name: getattr(self, name) for name in shared.split()} | {
             "viscous_theta": self.viscous_theta or (0.5 if follows else 1.0),
             "sweep_weights": self.sweep_weights or ("chebyshev" if follows else "equal"),
+            "sweep_pressure": self.sweep_pressure or ("smooth" if follows else "rough"),
             "derivative_frame": {2: "initial", "midpoint": "midpoint"}.get(self.algorithm, "updated"),
             "search_every_iteration": self.algorithm == "original",
             "divergence_tolerance": self.tolerance,
