@@ -1,3 +1,4 @@
+import subprocess
 import sys
 
 import pytest
@@ -40,6 +41,13 @@ def test_end_to_end(alsph, tmp_path, small_options):
     assert open_run(run).history["time"][-1] >= 0.25
     assert alsph("run", "cylinder", *small_options, "--until=0.02", "--force", "-o", run)[0] == 0
     assert open_run(run).history["time"][-1] < 0.04
+
+
+def test_commands_load_scipy_and_matplotlib_only_where_they_use_them():
+    """Half a second each, which help, a completion or a mistyped option must not take."""
+    program = "import sys, alsph.cli; print([name for name in sys.modules if name in ('matplotlib', 'scipy')])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
 
 
 def test_configuration_file_with_options_on_top(alsph, tmp_path):

@@ -3,9 +3,10 @@
 `solve` computes the flow at Re = 200 in the paper's channel with NGSolve (`finite_elements.py`), started as the case
 is; it needs an environment of its own. `compare` starts alsph with that field at t* = 2, when the boundary layers are
 there and the pressure waves of the impulsive start are not, and prints at every half time unit forces, those of the
-reference in brackets, and errors of the velocity within 2 D of the centre.
+reference in brackets, and errors of the velocity within 2 D of the centre; at the end errors at the particles beside
+the cylinder, by layers, 40 to 100 degrees from the front.
 
-    python -m venv fem && fem/bin/pip install ngsolve
+    python -m venv fem && fem/bin/pip install ngsolve scipy
     fem/bin/python benches/reference/cylinder.py solve --until 6 --resolutions 20 30 -o fields.npz
     python benches/reference/cylinder.py compare fields.npz --resolution 20 [--set wall_velocity=adami viscous_order=2]
 """
@@ -13,14 +14,20 @@ reference in brackets, and errors of the velocity within 2 D of the centre.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import RegularGridInterpolator
 
 REYNOLDS, LENGTH, HEIGHT, UPSTREAM, RADIUS, PERTURBATION = 200.0, 14.0, 13.0, 4.0, 0.5, 0.1
 START, EVERY = 2.0, 0.5
 SPACING, REACH = 0.05, 2.0  # of the points of comparison: spacing, distance from the centre
+RADII, ANGLES = np.linspace(0.502, 1.0, 167), np.radians(np.linspace(-180, 180, 181))  # of a net around the cylinder
+NET_EVERY = 0.1
+LAYERS = (0, 1, 2, 3, 4, 6, 8)  # heights over the surface [Δx] between which errors are averaged
+SIDE = np.radians((40, 100))  # from the front
 
 
 def cell_centres(resolution: int) -> np.ndarray:
@@ -63,7 +70,9 @@ def solve(until: float, resolutions: list[int], output: Path, step: float = 0.00
         return np.array(flow.velocity(found)), np.array(flow.pressure(found)).ravel()
 
     saved: dict[str, np.ndarray] = {}
-    history, snapshots, points_compared = [], [], comparison_points()
+    history, snapshots, net, points_compared = [], [], [], comparison_points()
+    radii, angles = np.meshgrid(RADII, ANGLES, indexing="ij")
+    around = np.stack([UPSTREAM - radii * np.cos(angles), radii * np.sin(angles)], axis=-1).reshape(-1, 2)
     for n, time in enumerate(flow.march(until, step), start=1):
         if n % 10 == 0:
             _, *parts, lift, _, _ = flow.loads()
@@ -74,6 +83,8 @@ def solve(until: float, resolutions: list[int], output: Path, step: float = 0.00
                 f"t* = {time:.1f}: C_D = {history[-1][1]:.4f} + {history[-1][2]:.4f}, C_L = {history[-1][3]:+.4f}",
                 flush=True,
             )
+        if time > START + 1 - step / 2 and n % round(NET_EVERY / step) == 0:
+            net.append((time, np.column_stack(at(around)).reshape(*radii.shape, 3)))
         if n == round(START / step):
             for resolution in resolutions:
                 points = cell_centres(resolution)
@@ -86,7 +97,8 @@ def solve(until: float, resolutions: list[int], output: Path, step: float = 0.00
                 fields[outside] = np.column_stack(values)
                 saved[f"start_{resolution}"] = fields
     times, fields = zip(*snapshots, strict=True)
-    np.savez_compressed(output, history=history, times=times, velocity=fields, **saved)
+    net_times, nets = zip(*net, strict=True)
+    np.savez_compressed(output, history=history, times=times, velocity=fields, net_times=net_times, net=nets, **saved)
 
 
 def compare(path: Path, resolution: int, until: float, settings: dict[str, object]) -> None:
@@ -110,13 +122,20 @@ def compare(path: Path, resolution: int, until: float, settings: dict[str, objec
 
     simulation = Started(resolution=resolution, reynolds=REYNOLDS, **settings).simulation()
     points = comparison_points()
-    times, known = fields["times"], fields["history"]
+    times, known, net = fields["times"], fields["history"], dict(zip(fields["net_times"], fields["net"], strict=True))
+    beside = []
     print("t*     C_D pressure         C_D viscous          C_L                  rms error of u, v [U]")
-    for time, expected in zip(times[times > START], fields["velocity"][times > START], strict=True):
-        if time > until:
+    velocities = dict(zip(times, fields["velocity"], strict=True))
+    for time in sorted({*times[times > START], *net}):
+        if time > until + NET_EVERY / 2:
             break
         simulation.run_until(time - START)
-        state, history = simulation.snapshot(), simulation.history()
+        state = simulation.snapshot()
+        if time in net:
+            beside.append(errors_beside(state, net[time], resolution))
+        if time not in velocities:
+            continue
+        expected, history = velocities[time], simulation.history()
         fluid = state["kind"] == Kind.FLUID
         found, _ = interpolate(state["position"][fluid], state["velocity"][fluid], points, 1 / resolution)
         error = np.sqrt(((found - expected) ** 2).mean(axis=0))
@@ -127,6 +146,30 @@ def compare(path: Path, resolution: int, until: float, settings: dict[str, objec
             theirs = known[(known[:, 0] > time - EVERY / 2) & (known[:, 0] <= time), column].mean()
             row += f"   {ours:+.4f} ({theirs:+.4f})"
         print(row, "  {:.4f} {:.4f}".format(*error), flush=True)
+    if beside:
+        print("height [Δx]  mean errors of u along and off the surface [U], and of C_p less its mean over all heights")
+        found = np.concatenate(beside)
+        for low, high in itertools.pairwise(LAYERS):
+            within = (found[:, 0] >= low) & (found[:, 0] < high)
+            print(f"{low} to {high}      ", " ".join(f"{value:+.3f}" for value in found[within, 1:].mean(axis=0)))
+
+
+def errors_beside(state: dict[str, np.ndarray], net: np.ndarray, resolution: int) -> np.ndarray:
+    """Heights [Δx] of the particles at the cylinder's sides, and errors of u along and off the surface and of C_p."""
+    offset = state["position"] - (UPSTREAM, 0)
+    radius, angle = np.hypot(*offset.T), np.arctan2(offset[:, 1], -offset[:, 0])
+    near = (state["kind"] == 0) & (radius > RADII[0]) & (radius < RADII[-1])
+    radius, angle = radius[near], angle[near]
+    known = RegularGridInterpolator((RADII, ANGLES), net, method="cubic")(np.column_stack([radius, angle]))
+    velocity = state["velocity"][near] - known[:, :2]
+    pressure = 2 * (state["pressure"][near] - known[:, 2])
+    # Waves between inlet and outlet lift the pressure of all.
+    pressure -= np.median(pressure[radius > 0.8 * RADII[-1]])
+    cosine, sine = np.cos(angle), np.sin(angle)
+    along = np.sign(angle) * (velocity[:, 0] * sine + velocity[:, 1] * cosine)
+    off = velocity[:, 1] * sine - velocity[:, 0] * cosine
+    errors = np.column_stack([(radius - RADIUS) * resolution, along, off, pressure])
+    return errors[(np.abs(angle) > SIDE[0]) & (np.abs(angle) < SIDE[1])]
 
 
 def main() -> None:

@@ -1,13 +1,13 @@
 """Convergence of a case: a ladder of resolutions, observed orders, Richardson values and grid convergence indices."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from scipy.optimize import brentq
 
 from alsph import plotting, study
 from alsph.analysis import remark
@@ -19,6 +19,9 @@ from alsph.results import Run
 from alsph.study import Results, Study, Sweep
 from alsph.study.declaration import digest
 from alsph.tables import markdown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SAFETY = 1.25
 """Factor of safety of the grid convergence index from three resolutions (Roache 1994)."""
@@ -105,6 +108,8 @@ def grid_convergence(
     if not mismatch(1e-3) < 0 < mismatch(LARGEST_ORDER):
         kind = "diverging" if mismatch(1e-3) >= 0 else "monotonic"
         return Convergence(name, *known, kind, *unknown, np.nan, reference)
+    from scipy.optimize import brentq  # takes 0.1 s to load
+
     order = float(brentq(mismatch, 1e-3, LARGEST_ORDER))
     richardson = f3 + fine / (r23**order - 1)
     index = SAFETY * abs(fine) / scale / (r23**order - 1)

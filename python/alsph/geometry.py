@@ -1,16 +1,20 @@
 """Particle arrangements, and the problem that is handed to the engine."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import KDTree
 from shapely import Polygon
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
 
 FloatArray = NDArray[np.float64]
 
@@ -46,6 +50,13 @@ class Problem:
     def dimensions(self) -> int:
         """Number of space dimensions, 2 or 3."""
         return int(self.settings["dimensions"])
+
+
+def neighbour_tree(position: FloatArray) -> KDTree:
+    """Return a tree to find the neighbours of points among positions (n, d)."""
+    from scipy.spatial import KDTree  # half a second that most commands do without
+
+    return KDTree(position)
 
 
 def particles(
@@ -109,11 +120,11 @@ class Solid:
     normal: FloatArray
     depth: FloatArray
 
-    def where(self, chosen: NDArray[np.bool_]) -> "Solid":
+    def where(self, chosen: NDArray[np.bool_]) -> Solid:
         """Return the particles for which `chosen` (n,) is true."""
         return Solid(self.position[chosen], self.normal[chosen], self.depth[chosen])
 
-    def moved(self, offset: FloatArray) -> "Solid":
+    def moved(self, offset: FloatArray) -> Solid:
         """Return the particles moved by `offset` (2,)."""
         return Solid(self.position + offset, self.normal, self.depth)
 
@@ -179,7 +190,7 @@ def body_layers(shape: Polygon, spacing: float, layers: int) -> Solid:
     candidates = candidates[inside(core, candidates)]
     candidates = candidates[shapely.distance(shape.boundary, shapely.points(candidates)) < (layers - 0.5) * spacing]
     while len(candidates):
-        room = KDTree(position).query(candidates)[0]
+        room = neighbour_tree(position).query(candidates)[0]
         candidates, room = candidates[room > ROOM * spacing], room[room > ROOM * spacing]
         if len(candidates):
             position = np.concatenate([position, candidates[[room.argmax()]]])

@@ -3,10 +3,9 @@
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 from shapely import MultiPolygon, Polygon
 
-from alsph.geometry import FloatArray, inside, lattice, symmetric_centres
+from alsph.geometry import FloatArray, inside, lattice, neighbour_tree, symmetric_centres
 from alsph.thin import is_symmetric
 
 BAND = 4.0
@@ -77,12 +76,12 @@ def _beyond(cells: FloatArray, spacing: float) -> FloatArray:
 
 def _mirror(points: FloatArray) -> NDArray[np.intp]:
     """Return the index of the mirror image about y = 0 of each point (n, 2)."""
-    return np.asarray(KDTree(points).query(points * (1.0, -1.0))[1])
+    return np.asarray(neighbour_tree(points).query(points * (1.0, -1.0))[1])
 
 
 def _thinned(near: FloatArray, fixed: FloatArray, count: int, spacing: float, symmetric: bool) -> FloatArray:
     """Take away the most crowded particles, with their mirror images, until `count` are left."""
-    tree = KDTree(near)
+    tree = neighbour_tree(near)
     partner = _mirror(near) if symmetric else np.arange(len(near))
     crowd = _weights(near, np.concatenate([near, fixed]), spacing)
     kept = np.ones(len(near), bool)
@@ -105,7 +104,7 @@ def _gaussian(offset: FloatArray, spacing: float) -> FloatArray:
 
 def _weights(points: FloatArray, others: FloatArray, spacing: float) -> FloatArray:
     """Return the sum of the Gaussians of `others` at each of the points."""
-    near = KDTree(others).query_ball_point(points, 4 * WIDTH * spacing)
+    near = neighbour_tree(others).query_ball_point(points, 4 * WIDTH * spacing)
     return np.array([_gaussian(others[j] - point, spacing).sum() for point, j in zip(points, near, strict=True)])
 
 
@@ -118,7 +117,7 @@ def _spread(
     reach = 4 * WIDTH * spacing
     for _ in range(SWEEPS):
         everyone = np.concatenate([near, fixed])
-        pairs = KDTree(near).sparse_distance_matrix(KDTree(everyone), reach, output_type="coo_matrix")
+        pairs = neighbour_tree(near).sparse_distance_matrix(neighbour_tree(everyone), reach, output_type="coo_matrix")
         offset = near[pairs.row] - everyone[pairs.col]
         push = offset * _gaussian(offset, spacing)[:, None]
         force = np.stack([np.bincount(pairs.row, push[:, axis], len(near)) for axis in range(2)], axis=1)

@@ -7,12 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from scipy.ndimage import binary_fill_holes
 
 from alsph import analysis, sampling
 from alsph.durable import check_target, replacing
@@ -24,6 +21,9 @@ from alsph.text import shown
 from alsph.window import DEVELOPING
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from alsph.analysis import Window
     from alsph.ledger import Ledger
     from alsph.measures import Profile
@@ -50,6 +50,13 @@ FIELDS = {
     "velocity": FieldStyle(r"velocity $|\mathbf{u}|/U$", "viridis", False),
     "velocity_divergence": FieldStyle(r"velocity divergence $\nabla\cdot\mathbf{u}\,D/U$", "PuOr_r", True),
 }
+
+
+def _figure(width: float, height: float, layout: Literal["constrained", "compressed"] = "constrained") -> Figure:
+    """Return an empty figure of a size in inches."""
+    from matplotlib.figure import Figure  # half a second that only pictures take
+
+    return Figure(figsize=(width, height), layout=layout)
 
 
 def save(figure: Figure, path: str | Path, **options: Any) -> None:
@@ -131,9 +138,7 @@ def field(
     field_style(name)
     left, right, bottom, top = extent = _extent(snapshot, spacing, view)
     width = 9.0
-    figure = Figure(
-        figsize=(width, max(2.5, 0.81 * width * (top - bottom) / (right - left) + 0.75)), layout="compressed"
-    )
+    figure = _figure(width, max(2.5, 0.81 * width * (top - bottom) / (right - left) + 0.75), "compressed")
     axes = figure.subplots()
     _draw_field(axes, snapshot, name, spacing, extent, limit)
     axes.set(title=f"{TIME_LABEL} = {snapshot.time:.2f}")
@@ -165,7 +170,7 @@ def fields(
     left, right, bottom, top = extent = _extent(first, spacing, view)
     width = 6.5
     height = 0.85 * width * (top - bottom) / (right - left) + 0.6
-    figure = Figure(figsize=(width * len(names), height * len(snapshots)), layout="constrained")
+    figure = _figure(width * len(names), height * len(snapshots))
     grid = figure.subplots(len(snapshots), len(names), squeeze=False)
     for column, name in zip(grid.T, names, strict=True):
         limit: float | None = None
@@ -234,6 +239,8 @@ def _raster(
     if fluid.all():
         return picture, np.zeros_like(picture)
     body = sampling.fill(snapshot.position[~fluid], points, spacing).reshape(rows, columns)
+    from scipy.ndimage import binary_fill_holes
+
     hollow = binary_fill_holes(body > 0.5) & np.isnan(picture)
     return picture, np.where(hollow, 1.0, body)
 
@@ -253,7 +260,7 @@ def _limit(picture: FloatArray) -> float:
 
 def forces(run: Run, body: str | None = None) -> Figure:
     """Drag and lift coefficients over time with their parts, the averaging window shaded and the means drawn."""
-    figure = Figure(figsize=(9, 6), layout="constrained")
+    figure = _figure(9, 6)
     upper, lower = figure.subplots(2, 1, sharex=True)
     time = run.history["time"]
     for axes, axis, symbol in ((upper, "x", "C_D"), (lower, "y", "C_L")):
@@ -284,7 +291,7 @@ def spectrum(runs: dict[str, Run], body: str | None = None) -> Figure:
     body : str, optional
         Name of the body; the only one if None.
     """
-    figure = Figure(figsize=(9, 6), layout="constrained")
+    figure = _figure(9, 6)
     grid = figure.subplots(2, 1, sharex=True)
     for axes, axis, symbol in zip(grid, "xy", ("C_D", "C_L"), strict=True):
         for name, run in runs.items():
@@ -338,7 +345,7 @@ def pressure_coefficient(
     """
     if coefficient.surface and coefficient.surface.chord is not None:
         return _pressure_over_chord(coefficient, coefficient.surface, coefficient.surface.chord, reference)
-    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    figure = _figure(7, 4.5)
     axes = figure.subplots()
     theta = np.mod(coefficient.theta, 360.0)
     for side, label, style in (
@@ -365,7 +372,7 @@ def _pressure_over_chord(
     chord: FloatArray,
     reference: tuple[FloatArray, FloatArray] | None,
 ) -> Figure:
-    figure = Figure(figsize=(10, 4.5), layout="constrained")
+    figure = _figure(10, 4.5)
     left, right = figure.subplots(1, 2, sharey=True)
     several = surface.part.max() > 0
     for part in np.unique(surface.part):
@@ -417,7 +424,7 @@ def ledger(run: Run) -> Figure:
         ("$u_{max}/U$", {"largest velocity": history.get("velocity_max", empty)}),
         (r"$\dot E\,/\,\rho U^3D^{d-1}$", {}),
     ]
-    figure = Figure(figsize=(12, 8.5), layout="constrained")
+    figure = _figure(12, 8.5)
     grid = figure.subplots(4, 2, sharex=True)
     for axes, (label, curves) in zip(grid.flat, panels, strict=True):
         for name, values in curves.items():
@@ -457,7 +464,7 @@ def profile(curves: dict[str, Profile]) -> Figure:
     curves : dict
         The same profile of one run or several, by name; the last one's reference is drawn.
     """
-    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    figure = _figure(7, 4.5)
     axes = figure.subplots()
     for name, curve in curves.items():
         axes.plot(*curve.computed, lw=1.2, label=name)
@@ -506,7 +513,7 @@ def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str
     """
     columns = min(len(panels), 3)
     rows = -(-len(panels) // columns)
-    figure = Figure(figsize=(6.5 * columns, 4.5 * rows), layout="constrained")
+    figure = _figure(6.5 * columns, 4.5 * rows)
     grid = figure.subplots(rows, columns, squeeze=False).flat
     for axes, (name, curves) in zip(grid, panels.items(), strict=False):
         for index, curve in enumerate(curves):
@@ -537,7 +544,7 @@ def convergence(errors: dict[str, dict[int, float]]) -> Figure:
     errors : dict
         The errors of each quantity by resolution D/Δx.
     """
-    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    figure = _figure(7, 4.5)
     axes = figure.subplots()
     for name, series in errors.items():
         axes.loglog([*series], np.abs([*series.values()]), "o-", label=name)

@@ -1,15 +1,16 @@
 """What a run folder tells: forces, Strouhal number, pressure coefficient, divergence, snapshots and figures."""
 
+from __future__ import annotations
+
 import html
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from alsph import analysis, plotting, reading, remarks, sampling
 from alsph.analysis import Estimate, Window
@@ -24,6 +25,9 @@ from alsph.progress import duration
 from alsph.reading import Snapshot
 from alsph.surface import Surface
 from alsph.text import in_figure, printable, shown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from alsph.errors import ConfigError
-from alsph.geometry import FloatArray, Kind
+from alsph.geometry import FloatArray, Kind, neighbour_tree
 
 if TYPE_CHECKING:
     from alsph.results import Run
@@ -24,7 +23,7 @@ VOID = 1.5  # points further than this many Δx from every particle have no valu
 def _nearest(position: FloatArray, points: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
     """Distances (m, k) from each point to its nearest particles, nearest first, and their indices (m, k)."""
     count = min(NEIGHBOURS_PER_DIMENSION * points.shape[1], len(position))
-    distance, index = KDTree(position).query(points, k=[*range(1, count + 1)])
+    distance, index = neighbour_tree(position).query(points, k=[*range(1, count + 1)])
     return distance, index
 
 
@@ -127,7 +126,7 @@ def initial_state(state: dict[str, Any], run: Run, *, outlet: bool = True) -> di
         raise ConfigError(f"initial_run = '{run.path}': it is in {dimensions}-D and this case in {own}-D")
     source = snapshot.position[snapshot.fluid]
     fields = np.column_stack([snapshot.velocity, snapshot.pressure])[snapshot.fluid]
-    near = KDTree(source).query(state["position"])[0] < VOID * run.spacing
+    near = neighbour_tree(source).query(state["position"])[0] < VOID * run.spacing
     takers = {"velocity": [Kind.FLUID, *[Kind.OUTLET] * outlet], "pressure": [Kind.FLUID, Kind.INLET]}
     started = state | {name: state[name].copy() for name in takers}
     chosen = np.flatnonzero(near & (state["kind"] != Kind.SOLID))

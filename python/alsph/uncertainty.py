@@ -9,7 +9,6 @@ standard uncertainty is the distance within which the settled mean lies with the
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtr, stdtrit
 
 from alsph.geometry import FloatArray
 
@@ -89,6 +88,8 @@ def trend(averages: FloatArray) -> float:
     error = np.sqrt(residual / (count - 2) / squares * (1 + correlation) / (1 - correlation))
     best = int(np.argmax(np.abs(slope) / error))
     change = slope[best] * (shapes[best, -1] - shapes[best, 0])
+    from scipy.special import stdtrit
+
     least = max(TREND, stdtrit(count - 2, 0.975))
     return float(change) if abs(slope[best]) > least * error[best] else 0.0
 
@@ -124,6 +125,7 @@ def _relaxing(averages: FloatArray, value: float) -> float:
     freedom = max(len(averages) - 3, 1)  # mean, amplitude, time
     residual = np.maximum(((deviations - amplitude[:, None] * centred) ** 2).sum(axis=1), 1e-24)
     likelihood = -0.5 * (len(averages) - 2) * np.log(residual) - np.log(np.abs(rates))  # any time as likely as another
+
     weight = np.exp(likelihood - likelihood.max())
     if np.ptp(averages) > LARGE_GROWTH and weight[rates > 0].sum() > GROWTH * weight.sum():
         return np.inf
@@ -136,6 +138,8 @@ def _relaxing(averages: FloatArray, value: float) -> float:
 
 def _half_width(center: FloatArray, error: FloatArray, likelihood: FloatArray, freedom: int) -> float:
     """Distance from zero within which a mixture of Student's distributions has the probability of one sigma."""
+    from scipy.special import stdtr
+
     weight = np.exp(likelihood - likelihood.max())
     weight /= weight.sum()
     low, high = 0.0, float(np.abs(center).max() + 20 * error.max())

@@ -1,13 +1,14 @@
 """Validation: cases at several resolutions, judged by their measures, and the report on it."""
 
+from __future__ import annotations
+
 import html
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from rich.console import Console
 
 from alsph import analysis, cases, plotting
@@ -20,6 +21,9 @@ from alsph.remarks import keywords
 from alsph.results import Run
 from alsph.run import Control, complete
 from alsph.tables import markdown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 HEADER = "case parameters resolution quantity value reference error tolerance order result".split()
 SNAPSHOTS = 10

@@ -1,15 +1,16 @@
 """What a study found: a row of results for each run, tables, and figures in the form that the study declares."""
 
+from __future__ import annotations
+
 import csv
 import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure as Picture
 
 from alsph import plotting
 from alsph.analysis import Estimate, remark
@@ -27,6 +28,9 @@ from alsph.study.state import ENDED, RUNS, State, states
 from alsph.tables import markdown
 from alsph.text import in_figure, printable
 from alsph.window import DEVELOPING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Picture
 
 DIVERGENCE = "mean velocity divergence, |∇·u| D/U"
 OF_ALL_RUNS = (
@@ -107,9 +111,7 @@ class Results:
     found: list[dict[str, Any]]
 
     @classmethod
-    def of(
-        cls, study: Study, points: list[Point], output: Path, failures: Mapping[str, str] | None = None
-    ) -> "Results":
+    def of(cls, study: Study, points: list[Point], output: Path, failures: Mapping[str, str] | None = None) -> Results:
         """Collect the results from the run folders in ``output/runs``; `failures` are messages by name of the run."""
         found = states(points, output, failures)
         reached = [found[point.name] for point in points]
