@@ -17,6 +17,7 @@ ALSPH = str(HERE.parents[1])
 CODES = {
     "alsph": (sys.executable, [ALSPH], "alsph_peer.py"),
     "pysph": (sys.executable, ["pysph==1.0b2", ALSPH], "pysph_peer.py"),
+    "sphinxsys": (sys.executable, [ALSPH], "sphinxsys_peer.py"),
     "jax-sph": ("python3.10", ["jax-sph==0.1.0", "scipy"], "jax_sph_peer.py"),
 }
 

@@ -5,6 +5,13 @@ Rows are kept in curve.jsonl as they come, and those that are there are not run 
     python benches/peers/curve.py                      # everything: days
     python benches/peers/curve.py taylor_green cavity  # some cases
     python benches/peers/curve.py --most 600           # only what takes less CPU time than that, as far as is known
+
+SPHinXsys is no package: its rows are left out unless `--sphinxsys` names the folders of its sources and of its library,
+both outside of this repository; Simbody, TBB, Boost, Eigen and spdlog are to be there (ten minutes on one core):
+
+    cmake -S SOURCES -B BUILD -G Ninja -DCMAKE_BUILD_TYPE=Release -DSPHINXSYS_3D=OFF -DSPHINXSYS_BUILD_TESTS=OFF \\
+        -DSPHINXSYS_DEVELOPER_MODE=OFF -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=12
+    ninja -C BUILD sphinxsys_2d
 """
 
 import argparse
@@ -28,13 +35,14 @@ VARIANTS = {
     "paper": ("the paper's Algorithm 2, in alsph", "alsph", ["--paper"], "C2s-"),
     "edac": ("PySPH, EDAC", "pysph", ["--scheme=edac", "--cache"], "C1^-"),
     "sisph": ("PySPH, SISPH", "pysph", ["--scheme=sisph", "--cache"], "C3v-"),
+    "sphinxsys": ("SPHinXsys", "sphinxsys", ["--relaxed"], "C4D-"),
 }
 
 # Case: end and window of the averages, resolutions, variants, and what the error is of.
 CASES = {
     "taylor_green": (1.0, 1.0, [25, 50, 100], list(VARIANTS), "Taylor-Green, Re = 100: velocity"),
-    "cavity": (20.0, 5.0, [25, 50, 100], ["alsph", "paper", "edac"], "cavity, Re = 100: worst extremum"),
-    "cylinder": (40.0, 15.0, [10, 15, 20, 30], ["alsph", "paper", "edac"], "cylinder, Re = 200: drag"),
+    "cavity": (20.0, 5.0, [25, 50, 100], ["alsph", "paper", "edac", "sphinxsys"], "cavity, Re = 100: worst extremum"),
+    "cylinder": (40.0, 15.0, [10, 15, 20, 30], ["alsph", "paper", "edac", "sphinxsys"], "cylinder, Re = 200: drag"),
 }
 
 
@@ -65,7 +73,7 @@ def likely(rows: dict[tuple[str, str, int], dict], case: str, variant: str, reso
     return row["cpu_per_time"] * row["until"] * (resolution / row["resolution"]) ** 3
 
 
-def run(cases: list[str], most: float, folder: Path) -> None:
+def run(cases: list[str], most: float, folder: Path, sphinxsys: list[Path] | None) -> None:
     """Run what is missing, the coarse before the fine."""
     for case in cases:
         until, window, resolutions, variants, _ = CASES[case]
@@ -74,6 +82,10 @@ def run(cases: list[str], most: float, folder: Path) -> None:
             if (case, variant, resolution) in rows or likely(rows, case, variant, resolution) > most:
                 continue
             _, code, more, _ = VARIANTS[variant]
+            if code == "sphinxsys":
+                if sphinxsys is None:
+                    continue
+                more = [*more, *(f"--{name}={path}" for name, path in zip(("source", "build"), sphinxsys, strict=True))]
             arguments = [case, f"--resolution={resolution}", f"--until={until}", f"--window={window}", *more]
             result = measure(code, arguments, folder)
             if result is None:
@@ -116,10 +128,11 @@ def main() -> None:
     parser.add_argument("--most", type=float, default=np.inf, help="largest expected CPU time of a run [s]")
     parser.add_argument("--plot", action="store_true", help="run nothing")
     parser.add_argument("--environments", type=Path, default=ENVIRONMENTS, help="folder for the environments")
+    parser.add_argument("--sphinxsys", type=Path, nargs=2, metavar=("SOURCES", "BUILD"), help="where SPHinXsys is")
     options = parser.parse_args()
     options.environments.mkdir(parents=True, exist_ok=True)
     if not options.plot:
-        run(options.cases, options.most, options.environments.resolve())
+        run(options.cases, options.most, options.environments.resolve(), options.sphinxsys)
     cells = [
         [case, VARIANTS[variant][0], str(n), f"{row['cpu_per_time']:.3g}", f"{100 * error(case, row):.2g} %"]
         for (case, variant, n), row in sorted(read().items())
