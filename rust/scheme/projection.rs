@@ -21,7 +21,7 @@ use crate::boundary::{deep_in_inlet, extrapolate};
 use crate::frame::Frame;
 use crate::operators::{Divergence, Gradient, GradientAndLaplacian};
 use crate::parallel;
-use crate::particles::{ParticleKind, Particles};
+use crate::particles::{ParticleKind, Particles, Vector};
 use crate::scheme::{Derived, Step};
 use crate::settings::{Settings, SweepPressure, SweepWeights};
 
@@ -103,8 +103,14 @@ impl Projection {
                 *out = if none { 0.0 } else { value - derived[i].solenoidal };
             });
             extrapolate(settings, frame, kind, divergence, |divergence, j, _| divergence[j]);
-            let is_last = sweep + 1 == settings.projection_sweeps;
             let (corrected, pressure) = (frame.images.real(velocity), frame.images.real(pressure));
+            let correct = |i: usize, gradient: Vector<D>, u: &mut Vector<D>, p: &mut f64| {
+                *p -= factor * divergence[i];
+                if kind[i] == ParticleKind::Fluid {
+                    *u += gradient * relaxation;
+                }
+            };
+            let is_last = sweep + 1 == settings.projection_sweeps;
             if is_last && settings.sweep_pressure == SweepPressure::Smooth {
                 let (rough, before) = (&mut self.rough, &self.pressure_before);
                 frame.images.blank(rough, divergence.len());
@@ -112,20 +118,19 @@ impl Projection {
                     *rough = [divergence[i], pressure[i] - factor * divergence[i] - before[i]];
                 });
                 frame.images.scalars(rough);
-                frame.stencil.for_each(GradientAndLaplacian(rough), corrected, pressure, |i, (gradient, laplacian), u, p| {
-                    *p -= factor * divergence[i];
-                    if kind[i] == ParticleKind::Fluid {
-                        *p += laplacian * shortest;
-                        *u += gradient * relaxation;
-                    }
-                });
+                frame.stencil.for_each(
+                    GradientAndLaplacian(rough),
+                    corrected,
+                    pressure,
+                    |i, (gradient, laplacian), u, p| {
+                        correct(i, gradient, u, p);
+                        if kind[i] == ParticleKind::Fluid {
+                            *p += laplacian * shortest;
+                        }
+                    },
+                );
             } else {
-                frame.stencil.for_each(Gradient(divergence), corrected, pressure, |i, gradient, u, p| {
-                    *p -= factor * divergence[i];
-                    if kind[i] == ParticleKind::Fluid {
-                        *u += gradient * relaxation;
-                    }
-                });
+                frame.stencil.for_each(Gradient(divergence), corrected, pressure, correct);
             }
             frame.images.vectors(velocity);
             frame.images.check(divergence, |_, value| value);
