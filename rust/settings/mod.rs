@@ -1,0 +1,114 @@
+//! Numerical settings: what a simulation is told beside its particles.
+
+use crate::error::{Result, setting};
+use crate::kernel::KernelKind;
+use crate::particles::Vector;
+use serde::{Deserialize, Serialize};
+
+mod domain;
+mod lattice;
+mod limits;
+mod rules;
+mod validation;
+
+pub use domain::{Body, Boundary, Domain};
+pub use limits::TimeStepLimits;
+pub use rules::{DerivativeFrame, Shifting, SweepPressure, SweepWeights, VelocityLaplacian, WallPressure, WallVelocity};
+
+/// All that governs a simulation beside its particles. Any consistent units.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    pub dimensions: usize,
+    /// Δx.
+    pub particle_spacing: f64,
+    /// h/Δx.
+    pub smoothing_ratio: f64,
+    pub kernel: KernelKind,
+    pub density: f64,
+    /// ν.
+    pub kinematic_viscosity: f64,
+    /// Body force per unit mass, g.
+    pub body_force: Vec<f64>,
+    /// Largest Δt.
+    pub time_step: f64,
+    /// Largest u_max Δt/Δx of an adaptive step; no bound if not given.
+    #[serde(default)]
+    pub courant: Option<f64>,
+    /// Take less than `time_step` where the stability law asks for it.
+    pub adaptive_time_step: bool,
+    /// Time from which on every step is `time_step` all the same.
+    pub adaptive_until: Option<f64>,
+    /// Speed that no particle reaches unless the computation has gone wrong; none if not given.
+    #[serde(default)]
+    pub velocity_limit: Option<f64>,
+    /// Fraction of the penalty's stability law that an adaptive step uses for a given C_BV.
+    pub time_step_safety: f64,
+    pub derivative_frame: DerivativeFrame,
+    /// Search the neighbours again in every iteration (Fatehi et al. 2019). Only with the updated frame.
+    pub search_every_iteration: bool,
+    /// Cap of the inner iterations.
+    pub max_iterations: usize,
+    /// Projection sweeps after the iterations of a step; none in the paper.
+    pub projection_sweeps: usize,
+    pub sweep_weights: SweepWeights,
+    pub sweep_pressure: SweepPressure,
+    /// ε of (13), 1/time.
+    pub divergence_tolerance: f64,
+    /// C_BV, as in the paper; if not given r_AL Δt λ_max is 1, whatever the step.
+    #[serde(default)]
+    pub penalty_constant: Option<f64>,
+    /// Weight of the ∇²u of the new velocity in the viscous term, the rest being that of the old: 1 in (8), ½ of second order in time.
+    pub viscous_theta: f64,
+    pub velocity_laplacian: VelocityLaplacian,
+    /// Correct the scalar Laplacians so that they vanish for linear fields on any particle arrangement.
+    pub laplacian_correction: bool,
+    /// Order of the viscous term in the particle spacing, 2 or 4.
+    pub viscous_order: u8,
+    pub shifting: Shifting,
+    /// β of the maximum-velocity shift.
+    pub shift_coefficient: f64,
+    /// Largest shift in a step over Δx.
+    pub shift_limit: f64,
+    pub wall_velocity: WallVelocity,
+    pub wall_pressure: WallPressure,
+    pub domain: Domain,
+    pub bodies: Vec<Body>,
+}
+
+impl Settings {
+    /// Parse and validate.
+    pub fn from_json(text: &str) -> Result<Self> {
+        let settings: Self = serde_json::from_str(text).map_err(|e| setting("settings", e.to_string()))?;
+        settings.validate()?;
+        Ok(settings)
+    }
+
+    /// h.
+    pub fn smoothing_length(&self) -> f64 {
+        self.smoothing_ratio * self.particle_spacing
+    }
+
+    /// Radius beyond which the kernel vanishes.
+    pub fn support_radius(&self) -> f64 {
+        self.kernel.support() * self.smoothing_length()
+    }
+
+    /// Distance up to which others count as neighbours: the support radius and a hair, because on a lattice many lie at just the
+    /// support radius (4 Δx at h/Δx = 4/3), and rounding must not decide which of them count.
+    pub fn neighbour_distance(&self) -> f64 {
+        self.support_radius() * (1.0 + 5e-7)
+    }
+
+    /// Length of the inlet and outlet buffers: 6h, in whole spacings.
+    pub fn buffer_length(&self) -> f64 {
+        (6.0 * self.smoothing_ratio - 1e-9).ceil() * self.particle_spacing
+    }
+
+    /// A box beyond which nothing is expected: the domain, its buffers and solid walls.
+    pub fn bounds<const D: usize>(&self) -> (Vector<D>, Vector<D>) {
+        let margin = self.buffer_length() + 4.0 * self.support_radius();
+        let corner = |corner: &[f64], outward| Vector::from_fn(|axis, _| corner[axis] + outward * margin);
+        (corner(&self.domain.lower, -1.0), corner(&self.domain.upper, 1.0))
+    }
+}

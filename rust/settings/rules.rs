@@ -1,0 +1,101 @@
+//! The choices of a method.
+
+use crate::particles::Matrix;
+use serde::{Deserialize, Serialize};
+
+/// At which positions the derivatives inside the iteration are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DerivativeFrame {
+    /// Algorithm 1: ⟨ ⟩ at r^{n+1,m}.
+    Updated,
+    /// Algorithm 2: ⟨ ⟩ at r^n.
+    Initial,
+    /// ⟨ ⟩ at r^n + ½ u^n Δt, where u^{n+1} is given the divergence that makes it solenoidal at r^{n+1}: of second order in time.
+    Midpoint,
+}
+
+impl DerivativeFrame {
+    /// How far of the way u^n Δt the frame lies before the iteration.
+    pub fn fraction(self) -> f64 {
+        if self == Self::Midpoint { 0.5 } else { 0.0 }
+    }
+
+    /// The ∇·u that a u^{n+1} of this ∇u, solenoidal once the particles have moved, has in the frame: in the middle of the step, half a
+    /// step before r^{n+1}, it is ½Δt tr (∇u)². Zero in the paper's algorithms.
+    #[inline(always)]
+    pub fn solenoidal_divergence<const D: usize>(self, gradient: &Matrix<D>, time_step: f64) -> f64 {
+        let lead = self.fraction() * time_step;
+        if lead > 0.0 { lead * (gradient * gradient).trace() } else { 0.0 }
+    }
+}
+
+/// Form of the viscous Laplacian (16).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VelocityLaplacian {
+    /// One compact scalar Laplacian a component.
+    Scalar,
+    /// (16) as printed, with the correction tensor.
+    Vector,
+}
+
+/// Velocity scale of the particle shift (18).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shifting {
+    /// `shift_coefficient` times the larger of h (½ tr (∇u)²)^½, the rate at which the flow presses neighbours together, and a third of the
+    /// root mean square of the neighbours' relative velocities.
+    Strain,
+    /// The XSPH velocity modulus u_v, as in (18), which vanishes at stagnation points.
+    Xsph,
+    /// `shift_coefficient` times the largest velocity, the older form.
+    MaximumVelocity,
+    None,
+}
+
+/// How far each of the projection sweeps goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SweepWeights {
+    /// All as far as the shortest waves allow.
+    Equal,
+    /// Together the polynomial of Chebyshev that is least over all waves but the longest.
+    Chebyshev,
+}
+
+/// What the pressure keeps of the projection sweeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SweepPressure {
+    /// Its share as it is.
+    Rough,
+    /// Its share without the shortest waves, of which the gradient sees next to nothing.
+    Smooth,
+}
+
+/// Velocity that a solid particle shows to the viscous term of a fluid neighbour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WallVelocity {
+    /// The velocity of the wall itself, as in the paper.
+    Paper,
+    /// 2 u_wall minus the Shepard average of the fluid's (Adami, Hu and Adams 2012).
+    Adami,
+    /// On the cubic through u_wall at the surface that fits the fluid above it best.
+    Cubic,
+    /// Per pair, linear through u_wall at the surface, with the ratio of distances limited (Morris, Fox and Zhu 1997).
+    Morris,
+}
+
+/// Pressure of a solid particle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WallPressure {
+    /// (10) with the pseudo-velocity of (8), then (20).
+    Paper,
+    /// Shepard average of the fluid's with the hydrostatic term (Adami, Hu and Adams 2012).
+    Adami,
+    /// Shepard average of the fluid's, each continued to the solid particle along its own gradient: exact for linear fields.
+    Linear,
+}
