@@ -1,11 +1,10 @@
 //! Breakdown of a computation: what is looked for after every step, and what is likely to have caused it.
 
 use crate::frame::Frame;
-use crate::kernel::Smoothing;
+use crate::kernel::{Smoothing, with_kernel};
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{Boundary, Settings, TimeStepLimits};
-use crate::with_kernel;
 
 /// A particle whose neighbours' kernels sum to less than this part of its own is alone.
 const LONELY: f64 = 0.25;

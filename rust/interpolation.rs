@@ -1,10 +1,9 @@
 //! Values of the fluid at any point: linear moving least squares.
 
 use crate::frame::Frame;
-use crate::kernel::Smoothing;
+use crate::kernel::{Smoothing, with_kernel};
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::Settings;
-use crate::with_kernel;
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Pressure and velocity at `point` from the fluid around it that is seen from there, exact for linear fields; None where no fluid is

@@ -2,7 +2,7 @@
 
 use crate::boundary::{Poison, Walls};
 use crate::frame::Frame;
-use crate::kernel::{Kernel, Smoothing};
+use crate::kernel::{Kernel, Smoothing, with_kernel};
 use crate::lanes::{Lanes, add_product, from, matrices, norm_squared, vectors};
 use crate::neighbours::{Cluster, Row, Visit};
 use crate::operators::Neighbours;
@@ -10,7 +10,6 @@ use crate::parallel;
 use crate::particles::{Matrix, ParticleKind, Particles, Vector};
 use crate::settings::{DerivativeFrame, Settings, Shifting};
 use crate::stencil::{Corrected, Stencil};
-use crate::with_kernel;
 
 /// How much of the neighbours' root mean square relative velocity the shift goes with where nothing is pressed together, as in shear and in
 /// vortices: enough to keep the spacing even, and no noise.

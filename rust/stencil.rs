@@ -1,13 +1,12 @@
 //! The stencil: all that the derivatives need to know of the particle positions of one frame. (14) (17)
 
-use crate::kernel::{Kernel, Smoothing};
+use crate::kernel::{Kernel, Smoothing, with_kernel};
 use crate::lanes::{LANES, Lanes, from, matrices, norm_squared, vectors};
 use crate::neighbours::{Cluster, Entry, NeighbourList, Row, RowMut, Visit, VisitMut};
 use crate::operators::{Neighbours, Nothing, Operator};
 use crate::parallel;
 use crate::particles::{Matrix, ParticleKind, Particles, Vector};
 use crate::settings::Settings;
-use crate::with_kernel;
 use std::ops::Range;
 
 /// Inverse correction tensors with a larger norm are taken for singular: too few neighbours for a gradient.

@@ -6,12 +6,11 @@
 //! slope of the velocity at the surface is the wall's shear.
 
 use crate::boundary::solid::for_each_weighted;
-use crate::kernel::Smoothing;
+use crate::kernel::{Smoothing, with_kernel};
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::Settings;
 use crate::stencil::Stencil;
-use crate::with_kernel;
 use nalgebra::SMatrix;
 use rayon::prelude::*;
 

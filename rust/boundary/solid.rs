@@ -2,13 +2,12 @@
 
 use crate::boundary::profile::profiles;
 use crate::frame::Frame;
-use crate::kernel::Smoothing;
+use crate::kernel::{Smoothing, with_kernel};
 use crate::neighbours::Entry;
 use crate::parallel;
 use crate::particles::{ParticleKind, Particles, Vector};
 use crate::settings::{Settings, WallVelocity};
 use crate::stencil::Stencil;
-use crate::with_kernel;
 use rayon::prelude::*;
 
 /// Largest ratio of the distances of solid and fluid from the surface: β_max − 1 of Morris, Fox and Zhu (1997).

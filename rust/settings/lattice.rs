@@ -1,8 +1,7 @@
 //! What the operators do to waves on a square lattice.
 
 use super::Settings;
-use crate::kernel::Smoothing;
-use crate::with_kernel;
+use crate::kernel::{Smoothing, with_kernel};
 
 impl Settings {
     /// λ_max Δx²: the largest eigenvalue of the negative compact Laplacian on a square lattice, sought over the wave
