@@ -2,9 +2,9 @@
 //!
 //! `cargo bench` prints the throughput in elements a second: pairs for search, stencil and operators, particles times passes for a step.
 
+use alsph::base::lanes::LANES;
 use alsph::breakdown;
 use alsph::frame::{Frame, Travel};
-use alsph::lanes::LANES;
 use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, VelocityGradient};
 use alsph::{Clock, Matrix, Simulation, Vector};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};

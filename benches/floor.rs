@@ -5,8 +5,8 @@
 //! `cargo bench --bench floor -- --save` keeps these ratios, and `cargo bench --bench floor` compares with those kept: so see
 //! whether a change made the engine slower.
 
+use alsph::base::lanes::{LANES, Lanes, Task, run};
 use alsph::frame::{Frame, Travel};
-use alsph::lanes::{LANES, Lanes, Task, run};
 use alsph::neighbours::{Entry, Grid, NeighbourList};
 use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient};
 use alsph::{Clock, Particles, Simulation, Vector};

@@ -1,9 +1,10 @@
 //! Breakdown of a computation: what is looked for after every step, and what is likely to have caused it.
 
+use crate::base::Vector;
+use crate::base::parallel;
 use crate::frame::Frame;
 use crate::kernel::{Smoothing, with_kernel};
-use crate::parallel;
-use crate::particles::{ParticleKind, Particles, Vector};
+use crate::particles::{ParticleKind, Particles};
 use crate::settings::{Boundary, Settings, TimeStepLimits};
 
 /// A particle whose neighbours' kernels sum to less than this part of its own is alone.

@@ -5,10 +5,11 @@
 //! alone; around an edge the shares of the two change smoothly, and always sum to one. Fluid still sees the fluid across, which a body
 //! thicker than 3 Δx keeps out of its reach: to hide it leaves the support of the kernel empty there, and the flow then breaks down.
 
-use crate::lanes::LANES;
+use crate::base::Vector;
+use crate::base::lanes::LANES;
+use crate::base::parallel;
 use crate::neighbours::{Cluster, Entry};
-use crate::parallel;
-use crate::particles::{ParticleKind, Particles, Vector};
+use crate::particles::{ParticleKind, Particles};
 use std::cmp::Ordering;
 
 /// Distance [Δx] of a thin part's particles from the line of sight at which they cease to hide all behind them; at twice that they

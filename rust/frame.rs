@@ -1,10 +1,11 @@
 //! A frame: the particle positions at which derivatives are taken, with their images, neighbours and stencil.
 
+use crate::base::Vector;
+use crate::base::parallel::{self, CHUNK};
 use crate::boundary::Images;
 use crate::faces::Faces;
 use crate::neighbours::Grid;
-use crate::parallel::{self, CHUNK};
-use crate::particles::{Particles, Vector};
+use crate::particles::Particles;
 use crate::settings::{DerivativeFrame, Settings};
 use crate::stencil::Stencil;
 use rayon::prelude::*;

@@ -1,8 +1,9 @@
 //! Values of the fluid at any point: linear moving least squares.
 
+use crate::base::Vector;
 use crate::frame::Frame;
 use crate::kernel::{Smoothing, with_kernel};
-use crate::particles::{ParticleKind, Particles, Vector};
+use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 use nalgebra::{DMatrix, SymmetricEigen};
 

@@ -4,18 +4,16 @@
 //! `Simulation::step`, and the method's equations (8) to (13) are [`scheme::Alsph::iterate`]. Equation numbers are those of
 //! Kolukisa, Ozbulut and Yildiz, Symmetry 2021, 13, 472.
 
+pub mod base;
 pub mod boundary;
 pub mod breakdown;
-pub mod error;
 pub mod faces;
 pub mod frame;
 mod interpolation;
 pub mod kernel;
-pub mod lanes;
 pub mod loads;
 pub mod neighbours;
 pub mod operators;
-pub mod parallel;
 pub mod particles;
 #[cfg(feature = "python")]
 mod python;
@@ -26,8 +24,8 @@ pub mod shifting;
 mod simulation;
 pub mod stencil;
 
-pub use error::{Error, Result};
-pub use particles::{Matrix, ParticleKind, Particles, Vector};
+pub use base::{Error, Matrix, Result, Vector};
+pub use particles::{ParticleKind, Particles};
 pub use report::{Clock, Report};
 pub use settings::Settings;
 pub use simulation::{Simulation, Snapshot};

@@ -6,10 +6,11 @@
 //! The viscous pairs feel the slope of the velocity over the width of a kernel. Where
 //! the velocity's slope at the surface is known, the viscous part is its shear over the area of the surface, and the pressure part the rest.
 
+use crate::base::Vector;
+use crate::base::parallel;
 use crate::boundary::{Walls, surface_area};
 use crate::frame::Frame;
-use crate::parallel;
-use crate::particles::{ParticleKind, Particles, Vector};
+use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 
 /// Force and torque on one body. In 2-D the torque's only component is the last one.

@@ -3,9 +3,9 @@
 //! Every operator sums weights times differences, so a constant field has derivatives of exactly zero, and corrects the sum
 //! with the tensor made of the same weights, so a linear field has its exact gradient.
 
-use crate::lanes::{LANES, Lanes, add_product, matrices, vectors};
+use crate::base::lanes::{LANES, Lanes, add_product, matrices, vectors};
+use crate::base::{Matrix, Vector};
 use crate::neighbours::{Cluster, Entry};
-use crate::particles::{Matrix, Vector};
 use crate::stencil::{Correction, Stencil};
 
 /// A cluster and its neighbours as an operator sees them. It must go over every neighbour once, then ask for the corrections.
@@ -29,7 +29,7 @@ pub trait Neighbours<V: Lanes, const D: usize> {
 pub trait Operator<const D: usize>: Sync {
     type Value;
 
-    /// The value at the particle of each lane. Mark `#[inline(always)]`, see [`crate::lanes::Task`].
+    /// The value at the particle of each lane. Mark `#[inline(always)]`, see [`crate::base::lanes::Task`].
     fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [Self::Value; LANES];
 }
 

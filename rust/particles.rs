@@ -1,11 +1,10 @@
 //! The particles: structure of arrays, real particles first, their images after them.
 
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use crate::settings::Body;
 use serde::{Deserialize, Serialize};
 
-pub type Vector<const D: usize> = nalgebra::SVector<f64, D>;
-pub type Matrix<const D: usize> = nalgebra::SMatrix<f64, D, D>;
+use crate::base::Vector;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]

@@ -1,8 +1,8 @@
 //! The extension module `alsph._alsph`: the only file that knows Python.
 
-use crate::lanes::{Instructions, LANES};
+use crate::base::Matrix;
+use crate::base::lanes::{Instructions, LANES};
 use crate::neighbours::Entry;
-use crate::particles::Matrix;
 use crate::{Clock, Error, ParticleKind, Particles, Report, Settings, Simulation, Vector};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};

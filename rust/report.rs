@@ -1,7 +1,7 @@
 //! Clock and report: what goes on through a restart, and what is recorded of a step.
 
+use crate::base::parallel;
 use crate::loads::Load;
-use crate::parallel;
 use crate::particles::{ParticleKind, Particles};
 use crate::scheme::{Outcome, Step};
 use crate::settings::{Boundary, Settings};

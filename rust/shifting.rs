@@ -1,13 +1,14 @@
 //! Artificial particle displacement. (18) (19)
 
+use crate::base::lanes::{Lanes, add_product, from, matrices, norm_squared, vectors};
+use crate::base::parallel;
+use crate::base::{Matrix, Vector};
 use crate::boundary::{Poison, Walls};
 use crate::frame::Frame;
 use crate::kernel::{Kernel, Smoothing, with_kernel};
-use crate::lanes::{Lanes, add_product, from, matrices, norm_squared, vectors};
 use crate::neighbours::{Cluster, Row, Visit};
 use crate::operators::Neighbours;
-use crate::parallel;
-use crate::particles::{Matrix, ParticleKind, Particles, Vector};
+use crate::particles::{ParticleKind, Particles};
 use crate::settings::{DerivativeFrame, Settings, Shifting};
 use crate::stencil::{Corrected, Stencil};
 

@@ -1,16 +1,17 @@
 //! A simulation: particles, settings and the order of the stages of a step.
 
+use crate::base::error::{Error, Result, setting};
+use crate::base::lanes::Instructions;
+use crate::base::parallel;
+use crate::base::{Matrix, Vector};
 use crate::boundary::{self, Walls};
 use crate::breakdown::{self, Symptom};
-use crate::error::{Error, Result, setting};
 use crate::frame::{Frame, Travel};
 use crate::interpolation::interpolate;
-use crate::lanes::Instructions;
 use crate::loads::loads;
 use crate::neighbours::Grid;
 use crate::operators::VelocityGradient;
-use crate::parallel;
-use crate::particles::{Matrix, ParticleKind, Particles, Vector};
+use crate::particles::{ParticleKind, Particles};
 use crate::report::{Clock, Report};
 use crate::scheme::{self, Alsph, Outcome, Step};
 use crate::settings::{Boundary, Settings};

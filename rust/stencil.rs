@@ -1,11 +1,12 @@
 //! The stencil: all that the derivatives need to know of the particle positions of one frame. (14) (17)
 
+use crate::base::lanes::{LANES, Lanes, from, matrices, norm_squared, vectors};
+use crate::base::parallel;
+use crate::base::{Matrix, Vector};
 use crate::kernel::{Kernel, Smoothing, with_kernel};
-use crate::lanes::{LANES, Lanes, from, matrices, norm_squared, vectors};
 use crate::neighbours::{Cluster, Entry, NeighbourList, Row, RowMut, Visit, VisitMut};
 use crate::operators::{Neighbours, Nothing, Operator};
-use crate::parallel;
-use crate::particles::{Matrix, ParticleKind, Particles, Vector};
+use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 use std::ops::Range;
 

@@ -1,8 +1,8 @@
 //! The operators on disordered particles: exact for linear fields, consistent for quadratic ones, in 2-D and 3-D.
 
+use alsph::base::lanes::{LANES, Portable};
 use alsph::boundary::Walls;
 use alsph::kernel::{Kernel, QuinticSpline, Smoothing, WendlandC2, WendlandC4};
-use alsph::lanes::{LANES, Portable};
 use alsph::neighbours::{Cluster, brute_force_neighbours};
 use alsph::operators::{
     Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, Operator, VelocityGradient, vector_laplacian,

@@ -7,9 +7,10 @@
 //! [`Images::real`], and begin what they form anew with [`Images::blank`]: with [`Images::poisons`] what is stale is NaN, which shows
 //! whatever reads it.
 
+use crate::base::Vector;
+use crate::base::parallel;
 use crate::boundary::poison::Poison;
-use crate::parallel;
-use crate::particles::{Particles, Vector};
+use crate::particles::Particles;
 use crate::settings::{Boundary, Domain};
 
 #[derive(Debug)]

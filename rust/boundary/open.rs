@@ -1,8 +1,9 @@
 //! What happens to particles that cross the sides of the domain: inlet and outlet buffers, periodic wrap, slip walls.
 
+use crate::base::Vector;
+use crate::base::parallel;
 use crate::neighbours::Grid;
-use crate::parallel;
-use crate::particles::{ParticleKind, Particles, Vector};
+use crate::particles::{ParticleKind, Particles};
 use crate::settings::{Boundary, Settings};
 
 /// Mass that crossed the inlet and outlet planes.

@@ -1,6 +1,6 @@
 //! Values that can say that they are stale: NaN, which whatever is computed from them becomes too.
 
-use crate::particles::Vector;
+use crate::base::Vector;
 use nalgebra::ArrayStorage;
 
 /// A value that can say that it is stale.

@@ -5,10 +5,11 @@
 //! odd mirror image, which Shepard averages amount to, turns the sign of the curvature there and halves it in the first layer. The
 //! slope of the velocity at the surface is the wall's shear.
 
+use crate::base::Vector;
+use crate::base::parallel;
 use crate::boundary::solid::for_each_weighted;
 use crate::kernel::{Smoothing, with_kernel};
-use crate::parallel;
-use crate::particles::{ParticleKind, Particles, Vector};
+use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 use crate::stencil::Stencil;
 use nalgebra::SMatrix;

@@ -1,11 +1,12 @@
 //! Solid walls: what velocity and pressure a solid particle shows to the fluid. (20)
 
+use crate::base::Vector;
+use crate::base::parallel;
 use crate::boundary::profile::profiles;
 use crate::frame::Frame;
 use crate::kernel::{Smoothing, with_kernel};
 use crate::neighbours::Entry;
-use crate::parallel;
-use crate::particles::{ParticleKind, Particles, Vector};
+use crate::particles::{ParticleKind, Particles};
 use crate::settings::{Settings, WallVelocity};
 use crate::stencil::Stencil;
 use rayon::prelude::*;

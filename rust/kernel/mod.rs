@@ -2,7 +2,7 @@
 //!
 //! A new kernel is one file and one name in each of the four lists below.
 
-use crate::lanes::Real;
+use crate::base::lanes::Real;
 use serde::{Deserialize, Serialize};
 
 mod quintic_spline;

@@ -1,7 +1,7 @@
 //! The quintic spline.
 
 use super::Kernel;
-use crate::lanes::Real;
+use crate::base::lanes::Real;
 use std::f64::consts::PI;
 
 /// Quintic spline, support 3h (Liu and Liu 2010, the paper's reference 38).

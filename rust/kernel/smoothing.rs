@@ -1,7 +1,7 @@
 //! Values and slopes of a kernel at its smoothing length.
 
 use super::Kernel;
-use crate::lanes::{Lanes, Real};
+use crate::base::lanes::{Lanes, Real};
 
 /// Added to the squares of q, so that a particle is no exception among its neighbours, and below what single precision resolves
 /// at ordinary distances.

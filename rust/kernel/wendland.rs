@@ -1,7 +1,7 @@
 //! Wendland's kernels.
 
 use super::Kernel;
-use crate::lanes::Real;
+use crate::base::lanes::Real;
 use std::f64::consts::PI;
 
 /// Wendland C2 in its 2-D and 3-D form, support 2h (Wendland 1995; Dehnen and Aly 2012).

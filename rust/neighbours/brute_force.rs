@@ -1,6 +1,6 @@
 //! The oracle that the grid search is tested against.
 
-use crate::particles::Vector;
+use crate::base::Vector;
 
 /// For each of the first `rows` points, the sorted indices of all other points closer than `radius`. O(N²).
 pub fn brute_force_neighbours<const D: usize>(points: &[Vector<D>], rows: usize, radius: f64) -> Vec<Vec<u32>> {

@@ -1,7 +1,7 @@
 //! Cells at least half as wide as the search radius; points are listed by cell with a counting sort.
 
-use crate::parallel;
-use crate::particles::Vector;
+use crate::base::Vector;
+use crate::base::parallel;
 use std::ops::Range;
 
 /// Cells that the search radius reaches to either side: narrow cells fit the sphere closer than wide ones.

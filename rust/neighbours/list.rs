@@ -2,9 +2,10 @@
 //! loop over the row then computes all four at once. Rows are stored chunk by chunk.
 
 use super::Grid;
-use crate::lanes::{LANES, Lanes, Task, from, norm_squared, run};
-use crate::parallel::CHUNK;
-use crate::particles::{ParticleKind, Particles, Vector};
+use crate::base::Vector;
+use crate::base::lanes::{LANES, Lanes, Task, from, norm_squared, run};
+use crate::base::parallel::CHUNK;
+use crate::particles::{ParticleKind, Particles};
 use rayon::prelude::*;
 use std::ops::Range;
 

@@ -1,10 +1,11 @@
 //! The ALSPH step: equations (8) to (13) of the paper.
 
+use crate::base::Vector;
+use crate::base::parallel;
 use crate::boundary::{Poison, Walls, deep_in_inlet, extrapolate};
 use crate::frame::Frame;
 use crate::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, vector_laplacian};
-use crate::parallel;
-use crate::particles::{ParticleKind, Particles, Vector};
+use crate::particles::{ParticleKind, Particles};
 use crate::scheme::projection::Projection;
 use crate::settings::{DerivativeFrame, Settings, VelocityLaplacian, WallPressure};
 use crate::shifting::measures_divergence;

@@ -17,11 +17,12 @@
 //! One σ for all sweeps is best for the shortest waves alone. Sweeps of different σ multiply to a polynomial of λ; that of Chebyshev on
 //! [a λ_max, λ_max] leaves least of all those waves, at the same cost.
 
+use crate::base::Vector;
+use crate::base::parallel;
 use crate::boundary::{deep_in_inlet, extrapolate};
 use crate::frame::Frame;
 use crate::operators::{Divergence, Gradient, GradientAndLaplacian};
-use crate::parallel;
-use crate::particles::{ParticleKind, Particles, Vector};
+use crate::particles::{ParticleKind, Particles};
 use crate::scheme::{Derived, Step};
 use crate::settings::{Settings, SweepPressure, SweepWeights};
 

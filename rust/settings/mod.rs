@@ -1,8 +1,8 @@
 //! Numerical settings: what a simulation is told beside its particles.
 
-use crate::error::{Result, setting};
+use crate::base::Vector;
+use crate::base::error::{Result, setting};
 use crate::kernel::KernelKind;
-use crate::particles::Vector;
 use serde::{Deserialize, Serialize};
 
 mod domain;

@@ -1,6 +1,6 @@
 //! The choices of a method.
 
-use crate::particles::Matrix;
+use crate::base::Matrix;
 use serde::{Deserialize, Serialize};
 
 /// At which positions the derivatives inside the iteration are taken.

@@ -1,7 +1,7 @@
 //! Checks of settings.
 
 use super::{Boundary, DerivativeFrame, Domain, Settings};
-use crate::error::{Result, setting};
+use crate::base::error::{Result, setting};
 
 /// Iterations or sweeps of a step above which a number is a mistake: a step cannot be interrupted.
 const MOST_PASSES: usize = 1000;

@@ -1,7 +1,7 @@
 //! Vectors and matrices of lanes.
 
 use super::{LANES, Lanes};
-use crate::particles::{Matrix, Vector};
+use crate::base::{Matrix, Vector};
 
 /// r_ij = r_i − r_j, of the particle i of each lane.
 #[inline(always)]

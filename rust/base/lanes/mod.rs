@@ -3,7 +3,7 @@
 //! [`run`] picks the vector instructions at run time ([`Instructions`]), so that one build is fast on every machine. All versions round alike
 //! (the same operations are fused, none is reordered), so the results are the same to the last bit.
 
-use crate::error::{Result, setting};
+use crate::base::error::{Result, setting};
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 use std::sync::OnceLock;
 
