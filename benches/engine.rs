@@ -4,8 +4,8 @@
 
 use alsph::base::lanes::LANES;
 use alsph::breakdown;
+use alsph::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, VelocityGradient};
 use alsph::frame::{Frame, Travel};
-use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, VelocityGradient};
 use alsph::{Clock, Matrix, Simulation, Vector};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use lattice::{METHODS, particles, settings};

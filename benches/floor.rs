@@ -6,9 +6,9 @@
 //! whether a change made the engine slower.
 
 use alsph::base::lanes::{LANES, Lanes, Task, run};
+use alsph::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient};
 use alsph::frame::{Frame, Travel};
 use alsph::neighbours::{Entry, Grid, NeighbourList};
-use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient};
 use alsph::{Clock, Particles, Simulation, Vector};
 use std::collections::HashMap;
 use std::hint::black_box;

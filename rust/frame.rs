@@ -2,12 +2,12 @@
 
 use crate::base::Vector;
 use crate::base::parallel::{self, CHUNK};
-use crate::boundary::Images;
+use crate::discretisation::Stencil;
 use crate::faces::Faces;
+use crate::halo::Images;
 use crate::neighbours::Grid;
 use crate::particles::Particles;
 use crate::settings::{DerivativeFrame, Settings};
-use crate::stencil::Stencil;
 use rayon::prelude::*;
 
 /// How far the particles will go while the neighbours of a frame are in use.

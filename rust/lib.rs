@@ -7,13 +7,14 @@
 pub mod base;
 pub mod boundary;
 pub mod breakdown;
+pub mod discretisation;
 pub mod faces;
 pub mod frame;
+pub mod halo;
 mod interpolation;
 pub mod kernel;
 pub mod loads;
 pub mod neighbours;
-pub mod operators;
 pub mod particles;
 #[cfg(feature = "python")]
 mod python;
@@ -22,7 +23,6 @@ pub mod scheme;
 pub mod settings;
 pub mod shifting;
 mod simulation;
-pub mod stencil;
 
 pub use base::{Error, Matrix, Result, Vector};
 pub use particles::{ParticleKind, Particles};

@@ -3,14 +3,14 @@
 use crate::base::lanes::{Lanes, add_product, from, matrices, norm_squared, vectors};
 use crate::base::parallel;
 use crate::base::{Matrix, Vector};
-use crate::boundary::{Poison, Walls};
+use crate::boundary::Walls;
+use crate::discretisation::{Corrected, Neighbours, Stencil};
 use crate::frame::Frame;
+use crate::halo::Poison;
 use crate::kernel::{Kernel, Smoothing, with_kernel};
 use crate::neighbours::{Cluster, Row, Visit};
-use crate::operators::Neighbours;
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::{DerivativeFrame, Settings, Shifting};
-use crate::stencil::{Corrected, Stencil};
 
 /// How much of the neighbours' root mean square relative velocity the shift goes with where nothing is pressed together, as in shear and in
 /// vortices: enough to keep the spacing even, and no noise.

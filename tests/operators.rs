@@ -2,14 +2,14 @@
 
 use alsph::base::lanes::{LANES, Portable};
 use alsph::boundary::Walls;
+use alsph::discretisation::{
+    Corrected, Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, Operator, VelocityGradient,
+    vector_laplacian,
+};
 use alsph::kernel::{Kernel, QuinticSpline, Smoothing, WendlandC2, WendlandC4};
 use alsph::neighbours::{Cluster, brute_force_neighbours};
-use alsph::operators::{
-    Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, Operator, VelocityGradient, vector_laplacian,
-};
 use alsph::settings::Settings;
 use alsph::shifting::shift;
-use alsph::stencil::Corrected;
 use alsph::{Matrix, ParticleKind, Vector};
 use approx::assert_relative_eq;
 use common::manufactured::{Errors, OperatorErrors, laplacian_of_positions};

@@ -1,6 +1,7 @@
 //! What happens at the sides of the domain, and the images beyond them.
 
-use alsph::boundary::{Images, deep_in_inlet, end_step};
+use alsph::boundary::{deep_in_inlet, end_step};
+use alsph::halo::Images;
 use alsph::neighbours::Grid;
 use alsph::{ParticleKind, Particles, Vector};
 use approx::assert_relative_eq;

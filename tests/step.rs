@@ -1,10 +1,10 @@
 //! One step against the equations, written out with the operators; what a shift and a refill see.
 
 use alsph::boundary::{Walls, end_step};
+use alsph::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient};
 use alsph::frame::{Frame, Travel};
 use alsph::kernel::{QuinticSpline, Smoothing};
 use alsph::neighbours::Grid;
-use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient};
 use alsph::scheme::{Alsph, Outcome, Step, relaxation};
 use alsph::settings::{SweepPressure, SweepWeights, WallPressure};
 use alsph::shifting::shift;

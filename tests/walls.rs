@@ -1,8 +1,8 @@
 //! What solid particles show to the viscous term, and its fourth order.
 
 use alsph::boundary::{Walls, surface_area};
+use alsph::discretisation::LaplacianAndGradient;
 use alsph::loads::{Load, loads};
-use alsph::operators::LaplacianAndGradient;
 use alsph::settings::WallVelocity;
 use alsph::{ParticleKind, Vector};
 use approx::assert_relative_eq;

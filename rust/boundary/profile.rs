@@ -8,10 +8,10 @@
 use crate::base::Vector;
 use crate::base::parallel;
 use crate::boundary::solid::for_each_weighted;
+use crate::discretisation::Stencil;
 use crate::kernel::{Smoothing, with_kernel};
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
-use crate::stencil::Stencil;
 use nalgebra::SMatrix;
 use rayon::prelude::*;
 

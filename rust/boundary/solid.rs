@@ -3,12 +3,12 @@
 use crate::base::Vector;
 use crate::base::parallel;
 use crate::boundary::profile::profiles;
+use crate::discretisation::Stencil;
 use crate::frame::Frame;
 use crate::kernel::{Smoothing, with_kernel};
 use crate::neighbours::Entry;
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::{Settings, WallVelocity};
-use crate::stencil::Stencil;
 use rayon::prelude::*;
 
 /// Largest ratio of the distances of solid and fluid from the surface: β_max − 1 of Morris, Fox and Zhu (1997).

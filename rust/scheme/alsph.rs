@@ -2,9 +2,10 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
-use crate::boundary::{Poison, Walls, deep_in_inlet, extrapolate};
+use crate::boundary::{Walls, deep_in_inlet, extrapolate};
+use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, vector_laplacian};
 use crate::frame::Frame;
-use crate::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, vector_laplacian};
+use crate::halo::Poison;
 use crate::particles::{ParticleKind, Particles};
 use crate::scheme::projection::Projection;
 use crate::settings::{DerivativeFrame, Settings, VelocityLaplacian, WallPressure};

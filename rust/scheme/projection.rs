@@ -20,8 +20,8 @@
 use crate::base::Vector;
 use crate::base::parallel;
 use crate::boundary::{deep_in_inlet, extrapolate};
+use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian};
 use crate::frame::Frame;
-use crate::operators::{Divergence, Gradient, GradientAndLaplacian};
 use crate::particles::{ParticleKind, Particles};
 use crate::scheme::{Derived, Step};
 use crate::settings::{Settings, SweepPressure, SweepWeights};

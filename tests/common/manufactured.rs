@@ -1,7 +1,7 @@
 //! A smooth periodic field with known derivatives, and the errors of the operators applied to it.
 
 use super::set::Set;
-use alsph::operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, vector_laplacian};
+use alsph::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, vector_laplacian};
 use alsph::{Matrix, Vector};
 use std::f64::consts::TAU;
 

@@ -1,7 +1,7 @@
 //! Particles with their frame, so that operators can be applied to fields given as functions.
 
+use alsph::discretisation::Operator;
 use alsph::frame::{Frame, Travel};
-use alsph::operators::Operator;
 use alsph::settings::Settings;
 use alsph::{Particles, Vector};
 

@@ -9,7 +9,7 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
-use crate::boundary::poison::Poison;
+use crate::halo::Poison;
 use crate::particles::Particles;
 use crate::settings::{Boundary, Domain};
 

@@ -3,9 +3,9 @@
 use crate::base::lanes::{LANES, Lanes, from, matrices, norm_squared, vectors};
 use crate::base::parallel;
 use crate::base::{Matrix, Vector};
+use crate::discretisation::{Neighbours, Nothing, Operator};
 use crate::kernel::{Kernel, Smoothing, with_kernel};
 use crate::neighbours::{Cluster, Entry, NeighbourList, Row, RowMut, Visit, VisitMut};
-use crate::operators::{Neighbours, Nothing, Operator};
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 use std::ops::Range;

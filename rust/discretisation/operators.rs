@@ -5,8 +5,8 @@
 
 use crate::base::lanes::{LANES, Lanes, add_product, matrices, vectors};
 use crate::base::{Matrix, Vector};
+use crate::discretisation::{Correction, Stencil};
 use crate::neighbours::{Cluster, Entry};
-use crate::stencil::{Correction, Stencil};
 
 /// A cluster and its neighbours as an operator sees them. It must go over every neighbour once, then ask for the corrections.
 pub trait Neighbours<V: Lanes, const D: usize> {

@@ -1,0 +1,7 @@
+//! Copies of particles beyond slip walls and periodic sides.
+
+mod images;
+mod poison;
+
+pub use images::Images;
+pub use poison::Poison;
