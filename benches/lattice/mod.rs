@@ -45,6 +45,7 @@ pub fn settings<const D: usize>(side: usize, method: Method) -> Settings {
     value["derivative_frame"] = method.derivative_frame.into();
     value["max_iterations"] = method.max_iterations.into();
     value["projection_sweeps"] = method.projection_sweeps.into();
+    value["sweep_pressure"] = "smooth".into();
     value["viscous_order"] = method.viscous_order.into();
     value["divergence_tolerance"] = 1e-12.into();
     common::parse(&value)
