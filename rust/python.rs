@@ -1,9 +1,12 @@
 //! The extension module `alsph._alsph`: the only file that knows Python.
 
-use crate::base::Matrix;
 use crate::base::lanes::{Instructions, LANES};
+use crate::base::{Error, Matrix, Vector};
 use crate::neighbours::Entry;
-use crate::{Clock, Error, ParticleKind, Particles, Report, Settings, Simulation, Vector};
+use crate::particles::{ParticleKind, Particles};
+use crate::report::{Clock, Report};
+use crate::settings::Settings;
+use crate::simulation::Simulation;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::create_exception;
