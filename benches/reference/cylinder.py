@@ -25,7 +25,7 @@ REYNOLDS, LENGTH, HEIGHT, UPSTREAM, RADIUS, PERTURBATION = 200.0, 14.0, 13.0, 4.
 START, EVERY = 2.0, 0.5
 SPACING, REACH = 0.05, 2.0  # of the points of comparison: spacing, distance from the centre
 RADII, ANGLES = np.linspace(0.502, 1.0, 167), np.radians(np.linspace(-180, 180, 181))  # of a net around the cylinder
-NET_EVERY = 0.1
+NET_FROM, NET_EVERY = 3.0, 0.1
 LAYERS = (0, 1, 2, 3, 4, 6, 8)  # heights over the surface [Δx] between which errors are averaged
 SIDE = np.radians((40, 100))  # from the front
 
@@ -70,7 +70,7 @@ def solve(until: float, resolutions: list[int], output: Path, step: float = 0.00
         return np.array(flow.velocity(found)), np.array(flow.pressure(found)).ravel()
 
     saved: dict[str, np.ndarray] = {}
-    history, snapshots, net, points_compared = [], [], [], comparison_points()
+    history, snapshots, net_times, net, points_compared = [], [], [], [], comparison_points()
     radii, angles = np.meshgrid(RADII, ANGLES, indexing="ij")
     around = np.stack([UPSTREAM - radii * np.cos(angles), radii * np.sin(angles)], axis=-1).reshape(-1, 2)
     for n, time in enumerate(flow.march(until, step), start=1):
@@ -83,8 +83,9 @@ def solve(until: float, resolutions: list[int], output: Path, step: float = 0.00
                 f"t* = {time:.1f}: C_D = {history[-1][1]:.4f} + {history[-1][2]:.4f}, C_L = {history[-1][3]:+.4f}",
                 flush=True,
             )
-        if time > START + 1 - step / 2 and n % round(NET_EVERY / step) == 0:
-            net.append((time, np.column_stack(at(around)).reshape(*radii.shape, 3)))
+        if time > NET_FROM - step / 2 and n % round(NET_EVERY / step) == 0:
+            net_times.append(time)
+            net.append(np.column_stack(at(around)).reshape(*radii.shape, 3))
         if n == round(START / step):
             for resolution in resolutions:
                 points = cell_centres(resolution)
@@ -97,8 +98,7 @@ def solve(until: float, resolutions: list[int], output: Path, step: float = 0.00
                 fields[outside] = np.column_stack(values)
                 saved[f"start_{resolution}"] = fields
     times, fields = zip(*snapshots, strict=True)
-    net_times, nets = zip(*net, strict=True)
-    np.savez_compressed(output, history=history, times=times, velocity=fields, net_times=net_times, net=nets, **saved)
+    np.savez_compressed(output, history=history, times=times, velocity=fields, net_times=net_times, net=net, **saved)
 
 
 def compare(path: Path, resolution: int, until: float, settings: dict[str, object]) -> None:
@@ -147,7 +147,7 @@ def compare(path: Path, resolution: int, until: float, settings: dict[str, objec
             row += f"   {ours:+.4f} ({theirs:+.4f})"
         print(row, "  {:.4f} {:.4f}".format(*error), flush=True)
     if beside:
-        print("height [Δx]  mean errors of u along and off the surface [U], and of C_p less its mean over all heights")
+        print("height [Δx]  mean errors of u along and off the surface [U], and of C_p less its median from 0.3 D on")
         found = np.concatenate(beside)
         for low, high in itertools.pairwise(LAYERS):
             within = (found[:, 0] >= low) & (found[:, 0] < high)
@@ -156,9 +156,11 @@ def compare(path: Path, resolution: int, until: float, settings: dict[str, objec
 
 def errors_beside(state: dict[str, np.ndarray], net: np.ndarray, resolution: int) -> np.ndarray:
     """Heights [Δx] of the particles at the cylinder's sides, and errors of u along and off the surface and of C_p."""
+    from alsph.geometry import Kind
+
     offset = state["position"] - (UPSTREAM, 0)
     radius, angle = np.hypot(*offset.T), np.arctan2(offset[:, 1], -offset[:, 0])
-    near = (state["kind"] == 0) & (radius > RADII[0]) & (radius < RADII[-1])
+    near = (state["kind"] == Kind.FLUID) & (radius > RADII[0]) & (radius < RADII[-1])
     radius, angle = radius[near], angle[near]
     known = RegularGridInterpolator((RADII, ANGLES), net, method="cubic")(np.column_stack([radius, angle]))
     velocity = state["velocity"][near] - known[:, :2]
