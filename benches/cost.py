@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from alsph.analysis import Estimate
+from alsph.analysis.averages import Estimate
 from alsph.cases import CASES
-from alsph.results import Run
+from alsph.results.run import Run
 from alsph.tables import markdown
 
 NAMED: dict[str, dict[str, Any]] = {

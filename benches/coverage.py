@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from alsph import analysis
-from alsph.uncertainty import uncertainty_of_mean
+from alsph.analysis import averages
+from alsph.analysis.uncertainty import uncertainty_of_mean
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from battery import DEVELOPING, ESTIMATED, SETTLED, autoregressive_series, times  # noqa: E402
@@ -22,11 +22,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=100)
     seeds = parser.parse_args().seeds
-    averages(5 * seeds)
+    independent(5 * seeds)
     records(seeds)
 
 
-def averages(trials: int) -> None:
+def independent(trials: int) -> None:
     """Print the coverage for averages that are an AR(1) series, and the ± over that of independent ones."""
     print("| periods | " + " | ".join(f"AR(1) {phi:g}" for phi in CORRELATIONS) + " |\n|---|---|---|---|---|")
     for count in (5, 10, 20, 40):
@@ -53,8 +53,8 @@ def records(seeds: int) -> None:
             rng = np.random.default_rng(seed)
             time = times(rng, end)
             drag, lift = signal(rng, time)
-            window = analysis.averaging_window(time, drag, lift)
-            mean = analysis.mean(time, drag, window)
+            window = averages.averaging_window(time, drag, lift)
+            mean = averages.mean(time, drag, window)
             told = "still developing" in mean.note
             found.append((window.periods, abs(mean - SETTLED), mean.uncertainty, told))
         periods, error, uncertainty, developing = np.array(found).T

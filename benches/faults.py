@@ -21,9 +21,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import alsph
-from alsph import checkpoint
 from alsph.config import Config, RunSettings
-from alsph.io import RunFolder
+from alsph.folder import checkpoint
+from alsph.folder.run_folder import RunFolder
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from processes import bits, command, wait_until_stepping

@@ -47,9 +47,10 @@ def targets(folder):
     """Return for each target the file that is damaged and the function that reads it."""
     import h5py
     import numpy as np
-    from alsph import checkpoint, config, open_run, reading, resume, study
+    from alsph import config, open_run, resume, study
     from alsph.errors import AlsphError
-    from alsph.outline import Outline
+    from alsph.folder import checkpoint, reading
+    from alsph.geometry.outline import Outline
 
     state = checkpoint.read(folder / "checkpoint.h5").state
     until = state["time"] + 1e-9

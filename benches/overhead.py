@@ -11,7 +11,8 @@ import time
 from collections import defaultdict
 
 import alsph
-from alsph import checkpoint, io, simulation, vtkhdf
+from alsph.engine import simulation
+from alsph.folder import checkpoint, run_folder, vtkhdf
 
 seconds, calls = defaultdict(float), defaultdict(int)
 
@@ -47,12 +48,12 @@ class Engine:
 Compiled = simulation._alsph.Simulation
 simulation._alsph.Simulation = Engine
 timed(Engine, "advance_until", "steps")
-timed(io.RunFolder, "append_history", "history")
-timed(io.RunFolder, "write_checkpoint", "checkpoints")
+timed(run_folder.RunFolder, "append_history", "history")
+timed(run_folder.RunFolder, "write_checkpoint", "checkpoints")
 timed(checkpoint, "digest", "digests of the state")
 timed(vtkhdf, "append", "outputs of the particles")
-timed(io.RunFolder, "append_surface", "surface pressure")
-timed(io.RunFolder, "write_info", "run.json")
+timed(run_folder.RunFolder, "append_surface", "surface pressure")
+timed(run_folder.RunFolder, "write_info", "run.json")
 
 resolution, until = (int(sys.argv[1]) if len(sys.argv) > 1 else 20), (float(sys.argv[2]) if len(sys.argv) > 2 else 2.0)
 with tempfile.TemporaryDirectory() as folder:

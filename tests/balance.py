@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 import shapely
-from alsph import sampling
+from alsph.analysis import sampling
+from alsph.arrays import FloatArray
 from alsph.cases import Body, Case
-from alsph.geometry import FloatArray, Kind
+from alsph.geometry.particles import Kind
 from shapely import affinity
 
 MARGINS = (0.3, 0.4, 0.5, 0.6)

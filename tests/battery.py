@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from alsph.geometry import FloatArray
+from alsph.arrays import FloatArray
 
 SETTLED, STROUHAL, LIFT = 1.4, 0.2, 0.6
 Signal = Callable[[np.random.Generator, FloatArray], tuple[FloatArray, FloatArray]]

@@ -1,6 +1,6 @@
 import pytest
 from alsph.cases import Cylinder
-from alsph.cli import app
+from alsph.cli.app import app
 
 SMALL = {"resolution": 8, "length": 5.0, "height": 4.0, "upstream": 2.0}
 

@@ -5,9 +5,9 @@ import sys
 import time as clock
 
 import h5py
-from alsph import checkpoint
 from alsph.config import Config, RunSettings
-from alsph.io import RunFolder
+from alsph.folder import checkpoint
+from alsph.folder.run_folder import RunFolder
 
 MAIN = [sys.executable, "-c", "from alsph.cli import main; main()"]
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from alsph.cases import Cylinder
 from alsph.config import Config, RunSettings
-from alsph.io import RunFolder
-from alsph.results import Run
+from alsph.folder.run_folder import RunFolder
+from alsph.results.run import Run
 
 DRAG, DRAG_SWING, LIFT, STROUHAL, CIRCULATION = 1.48, 0.05, 0.75, 0.21, 1.0
 SHED = 2 * np.pi * STROUHAL

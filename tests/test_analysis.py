@@ -4,9 +4,9 @@ import pickle
 
 import numpy as np
 import pytest
-from alsph import analysis
-from alsph.analysis import Estimate
-from alsph.uncertainty import uncertainty_of_mean
+from alsph.analysis import averages
+from alsph.analysis.averages import Estimate
+from alsph.analysis.uncertainty import uncertainty_of_mean
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
@@ -40,7 +40,7 @@ def test_batch_means_are_exact_for_straight_lines(steps, offset, slope, data):
     edges = np.unique(data.draw(st.lists(inside, min_size=2, max_size=6)))
     if len(edges) < 2 or np.diff(edges).min() < 1e-3:
         return
-    means = analysis.batch_means(time, offset + slope * time, edges)
+    means = averages.batch_means(time, offset + slope * time, edges)
     assert np.allclose(means, offset + slope * (edges[1:] + edges[:-1]) / 2, atol=1e-6, rtol=1e-9)
 
 
@@ -48,7 +48,7 @@ def test_batch_means_of_profiles_act_column_by_column():
     time = uneven_times(5.0)
     values = np.stack([time, time**2], axis=1)
     edges = np.array([1.0, 2.0, 4.0])
-    assert analysis.batch_means(time, values, edges) == pytest.approx(np.array([[1.5, 7 / 3], [3.0, 28 / 3]]), rel=1e-4)
+    assert averages.batch_means(time, values, edges) == pytest.approx(np.array([[1.5, 7 / 3], [3.0, 28 / 3]]), rel=1e-4)
 
 
 @given(st.floats(0.05, 2.0), st.floats(-3.0, 3.0), st.floats(0.0, 0.15))
@@ -56,7 +56,7 @@ def test_upward_crossings_of_a_sine_with_noise(frequency, phase, noise):
     time = uneven_times(20.0)
     signal = np.sin(2 * np.pi * frequency * time + phase)
     signal += noise * np.random.default_rng(0).uniform(-1, 1, len(time))
-    crossings = analysis.upward_crossings(time, signal, 0.3)
+    crossings = averages.upward_crossings(time, signal, 0.3)
     cycles = frequency * crossings + phase / (2 * np.pi)
     assert np.allclose(cycles, np.round(cycles), atol=0.03)
     assert abs(len(crossings) - 20 * frequency) < 2
@@ -67,15 +67,15 @@ def test_upward_crossings_of_a_sine_with_noise(frequency, phase, noise):
 def test_the_transient_is_cut_and_the_answers_are_known(strouhal, growth, noise, seed):
     time = uneven_times()
     drag, lift = signals(time, growth=growth, noise=noise, strouhal=strouhal, seed=seed)
-    window = analysis.averaging_window(time, drag, lift)
+    window = averages.averaging_window(time, drag, lift)
     assert window.settled
     assert growth - 3 < window.start < growth + 20
     assert time[-1] - window.end < 1.1 / strouhal + 0.02  # smoothing and dead band need a tenth of a period
     assert window.periods == round((window.end - window.start) * strouhal) >= 4
-    assert analysis.mean(time, drag, window) == pytest.approx(DRAG, rel=5e-3)
-    assert analysis.root_mean_square(time, lift, window) == pytest.approx(LIFT / math.sqrt(2), rel=1e-2)
-    assert analysis.amplitude(time, lift, window) == pytest.approx(LIFT, rel=1e-2)
-    assert analysis.strouhal(time, lift, window) == pytest.approx(strouhal, rel=3e-3)
+    assert averages.mean(time, drag, window) == pytest.approx(DRAG, rel=5e-3)
+    assert averages.root_mean_square(time, lift, window) == pytest.approx(LIFT / math.sqrt(2), rel=1e-2)
+    assert averages.amplitude(time, lift, window) == pytest.approx(LIFT, rel=1e-2)
+    assert averages.strouhal(time, lift, window) == pytest.approx(strouhal, rel=3e-3)
 
 
 def test_uncertainties_cover_the_errors():
@@ -85,8 +85,8 @@ def test_uncertainties_cover_the_errors():
         rng = np.random.default_rng(seed)
         drift = np.interp(time, np.arange(0, 70, 5.0), rng.normal(0, 0.01, 14))
         drag, lift = signals(time, growth=2.0, noise=0.02, seed=seed)
-        window = analysis.averaging_window(time, drag + drift, lift * (1 + drift))
-        estimate = analysis.mean(time, drag + drift, window)
+        window = averages.averaging_window(time, drag + drift, lift * (1 + drift))
+        estimate = averages.mean(time, drag + drift, window)
         misses.append(abs(estimate - DRAG) / estimate.uncertainty)
     assert np.mean(np.array(misses) < 1) > 0.5
     assert np.mean(np.array(misses) < 3) > 0.9
@@ -95,33 +95,33 @@ def test_uncertainties_cover_the_errors():
 def test_shedding_that_still_grows_is_averaged_over_its_later_half_and_says_so():
     time = uneven_times(30.0)
     lift = np.exp(0.1 * time) * np.sin(2 * np.pi * STROUHAL * time)
-    window = analysis.averaging_window(time, np.ones_like(time), lift)
+    window = averages.averaging_window(time, np.ones_like(time), lift)
     assert not window.settled and window.periods >= 2
     assert "not periodic yet" in window.rule
-    assert "not periodic yet" in analysis.strouhal(time, lift, window).note
+    assert "not periodic yet" in averages.strouhal(time, lift, window).note
 
 
 @pytest.mark.parametrize("kind", ["zero", "noise", "constant"])
 def test_without_shedding_the_later_half_is_averaged(kind):
     time = uneven_times(20.0)
     lift = {"zero": 0 * time, "noise": np.random.default_rng(0).normal(size=len(time)), "constant": 1 + 0 * time}[kind]
-    window = analysis.averaging_window(time, 1.2 + 0 * time, lift)
+    window = averages.averaging_window(time, 1.2 + 0 * time, lift)
     assert (window.periods, window.settled) == (0, False)
     assert window.start == pytest.approx(10.0, abs=0.1)
     assert "no regular shedding" in window.rule
-    assert analysis.mean(time, 1.2 + 0 * time, window) == pytest.approx(1.2)
-    assert math.isnan(analysis.strouhal(time, lift, window))
-    assert math.isnan(analysis.amplitude(time, lift, window))
+    assert averages.mean(time, 1.2 + 0 * time, window) == pytest.approx(1.2)
+    assert math.isnan(averages.strouhal(time, lift, window))
+    assert math.isnan(averages.amplitude(time, lift, window))
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_too_short_a_record_gives_nan_and_a_reason(count):
     time = np.arange(float(count))
-    window = analysis.averaging_window(time, time, time)
-    for measure in (analysis.mean, analysis.root_mean_square, analysis.amplitude, analysis.strouhal):
+    window = averages.averaging_window(time, time, time)
+    for measure in (averages.mean, averages.root_mean_square, averages.amplitude, averages.strouhal):
         estimate = measure(time, time, window)
         assert math.isnan(estimate) and estimate.note
-    mean, deviation = analysis.mean_profile(time, np.zeros((count, 4)), window)
+    mean, deviation = averages.mean_profile(time, np.zeros((count, 4)), window)
     assert np.isnan(mean).all() and np.isnan(deviation).all()
 
 
@@ -129,9 +129,9 @@ def test_too_short_a_record_gives_nan_and_a_reason(count):
 def test_any_short_record_gives_an_answer_without_failing(count, seed):
     rng = np.random.default_rng(seed)
     time, drag, lift = np.cumsum(rng.uniform(0.01, 1, count)), rng.normal(size=count), rng.normal(size=count)
-    window = analysis.averaging_window(time, drag, lift)
+    window = averages.averaging_window(time, drag, lift)
     assert time[0] <= window.start < window.end <= time[-1]
-    for measure in (analysis.mean, analysis.root_mean_square, analysis.amplitude, analysis.strouhal):
+    for measure in (averages.mean, averages.root_mean_square, averages.amplitude, averages.strouhal):
         assert isinstance(measure(time, lift, window), Estimate)
 
 
@@ -141,14 +141,14 @@ def test_the_spectral_peak_is_far_finer_than_a_bin(frequency, phase, periods):
     end = periods / frequency
     time = np.linspace(0, end, 3000)
     signal = np.sin(2 * np.pi * frequency * time + phase) + 0.2 * np.sin(6 * np.pi * frequency * time)
-    peak = analysis.spectral_peak(time, signal, 0.0, end, 1.1 * frequency)
+    peak = averages.spectral_peak(time, signal, 0.0, end, 1.1 * frequency)
     assert abs(peak - frequency) < 0.03 / end
 
 
 def test_a_sine_gives_a_line_of_its_amplitude_and_no_other():
     time = np.sort(np.random.default_rng(0).uniform(0, 40, 4000))
     signal = 3 + 0.7 * np.sin(2 * np.pi * 0.25 * time)
-    frequency, amplitude = analysis.amplitude_spectrum(time, signal, 0.0, 40.0)
+    frequency, amplitude = averages.amplitude_spectrum(time, signal, 0.0, 40.0)
     assert frequency[amplitude.argmax()] == pytest.approx(0.25)
     assert amplitude.max() == pytest.approx(0.7, rel=0.01)
     assert amplitude[frequency > 0.35].max() < 0.01
@@ -157,8 +157,8 @@ def test_a_sine_gives_a_line_of_its_amplitude_and_no_other():
 def test_strouhal_gives_both_methods_and_their_difference():
     time = uneven_times(60.0)
     drag, lift = signals(time, growth=0.0, noise=0.01)
-    window = analysis.averaging_window(time, drag, lift)
-    strouhal = analysis.strouhal(time, lift, window)
+    window = averages.averaging_window(time, drag, lift)
+    strouhal = averages.strouhal(time, lift, window)
     assert abs(strouhal - STROUHAL) < 3 * strouhal.uncertainty < 0.003
     assert "spectrum" in strouhal.note and "zero crossings" in strouhal.note
 
@@ -167,23 +167,23 @@ def test_mean_profile_over_whole_periods():
     time = np.arange(0.0, 60.0, 0.25)
     shape = np.linspace(-1, 1, 7)
     profiles = shape + np.sin(2 * np.pi * 0.2 * time)[:, None]
-    window = analysis.Window(np.arange(10.0, 60.0, 5.0), 9, True, "")
-    mean, deviation = analysis.mean_profile(time, profiles, window)
+    window = averages.Window(np.arange(10.0, 60.0, 5.0), 9, True, "")
+    mean, deviation = averages.mean_profile(time, profiles, window)
     assert mean == pytest.approx(shape, abs=1e-3)
     assert deviation == pytest.approx(np.full(7, math.sqrt(0.5)), rel=0.01)
 
 
 def test_error_norms_of_a_vector_field():
     exact = np.array([[3.0, 4.0], [0.0, 5.0]])
-    norms = analysis.error_norms(exact + [[0.0, 0.1], [0.3, 0.0]], exact)
+    norms = averages.error_norms(exact + [[0.0, 0.1], [0.3, 0.0]], exact)
     assert norms == pytest.approx({"l1": 0.04, "l2": math.sqrt(0.05) / 5, "max": 0.06})
 
 
 @given(st.floats(0.01, 10.0), st.floats(0.1, 10.0))
 def test_decay_rate(rate, start):
     time = np.linspace(0, 1, 50)
-    assert analysis.decay_rate(time, start * np.exp(-rate * time)) == pytest.approx(rate)
-    assert math.isnan(analysis.decay_rate(time[:2], time[:2]))
+    assert averages.decay_rate(time, start * np.exp(-rate * time)) == pytest.approx(rate)
+    assert math.isnan(averages.decay_rate(time[:2], time[:2]))
 
 
 @pytest.mark.parametrize(
@@ -203,38 +203,38 @@ def test_decay_rate(rate, start):
 def test_an_estimate_shows_two_digits_of_its_uncertainty(value, uncertainty, text):
     assert str(Estimate(value, uncertainty)) == text
     developing = Estimate(value, uncertainty, "still developing (drag changes)")
-    assert developing.developing and analysis.remark(developing) == " (still developing)"
+    assert developing.developing and averages.remark(developing) == " (still developing)"
     if value == value:
         assert str(developing) == f"{text} (still developing)"
     assert f"{developing:.2f}" == f"{value:.2f}"
-    assert analysis.remark(value) == analysis.remark(Estimate(value, uncertainty, "settled")) == ""
+    assert averages.remark(value) == averages.remark(Estimate(value, uncertainty, "settled")) == ""
 
 
 def window(*edges, rule="", growing=False):
-    return analysis.Window(np.array(edges), len(edges) - 1, True, rule, growing)
+    return averages.Window(np.array(edges), len(edges) - 1, True, rule, growing)
 
 
 def test_means_have_the_uncertainty_of_the_averages_over_the_periods():
     time = np.linspace(0, 8, 4001)
-    averages = np.array([1.0, 1.3, 0.9, 1.1, 1.2, 0.8])
-    values = averages[np.clip(time.astype(int) - 1, 0, 5)] + 0.5 * np.sin(2 * np.pi * time)
+    batches = np.array([1.0, 1.3, 0.9, 1.1, 1.2, 0.8])
+    values = batches[np.clip(time.astype(int) - 1, 0, 5)] + 0.5 * np.sin(2 * np.pi * time)
     six = window(*range(1, 8), rule="as told")
-    mean = analysis.mean(time, values, six)
+    mean = averages.mean(time, values, six)
     assert mean == pytest.approx(1.05, abs=1e-3) and mean.note == "as told" and not mean.developing
-    assert mean.uncertainty == pytest.approx(uncertainty_of_mean(averages, 1.05).standard, rel=0.01)
-    square = analysis.root_mean_square(time, values, six)
-    assert square == pytest.approx(math.sqrt(np.mean(averages**2) + 0.125), rel=1e-3)
-    spread = uncertainty_of_mean(averages**2, np.mean(averages**2)).standard
+    assert mean.uncertainty == pytest.approx(uncertainty_of_mean(batches, 1.05).standard, rel=0.01)
+    square = averages.root_mean_square(time, values, six)
+    assert square == pytest.approx(math.sqrt(np.mean(batches**2) + 0.125), rel=1e-3)
+    spread = uncertainty_of_mean(batches**2, np.mean(batches**2)).standard
     assert square.uncertainty == pytest.approx(spread / (2 * square), rel=0.02) and square.note == "as told"
-    swing = analysis.amplitude(time, values, six)
+    swing = averages.amplitude(time, values, six)
     assert swing == pytest.approx(0.5, rel=1e-3) and swing.uncertainty < 1e-3
-    assert analysis.mean(time, values, window(*range(1, 8), growing=True)).uncertainty == math.inf
-    few = analysis.mean(time, values, window(1, 2, 3, rule="why"))
+    assert averages.mean(time, values, window(*range(1, 8), growing=True)).uncertainty == math.inf
+    few = averages.mean(time, values, window(1, 2, 3, rule="why"))
     assert (few.uncertainty, few.note) == (math.inf, "too few periods for an uncertainty; why")
-    assert "too few" not in analysis.mean(time, values, window(1, 2, 3, 4)).note
-    assert analysis.amplitude(time, values, window(1, 2)) == pytest.approx(0.5, rel=1e-3)
-    assert analysis.mean(time, values, window(1, 2)) == pytest.approx(1, abs=1e-3)
-    nothing = analysis.root_mean_square(time, 0 * time, six)
+    assert "too few" not in averages.mean(time, values, window(1, 2, 3, 4)).note
+    assert averages.amplitude(time, values, window(1, 2)) == pytest.approx(0.5, rel=1e-3)
+    assert averages.mean(time, values, window(1, 2)) == pytest.approx(1, abs=1e-3)
+    nothing = averages.root_mean_square(time, 0 * time, six)
     assert (float(nothing), nothing.uncertainty) == (0.0, 0.0)
 
 
@@ -242,9 +242,9 @@ def test_means_have_the_uncertainty_of_the_averages_over_the_periods():
 def test_a_number_that_changes_in_a_settled_window_says_by_how_much(size):
     time = np.linspace(0, 10, 5001)
     values = size * (1 + 0.05 * (time - 5) + 1e-3 * np.sin(40 * time))
-    found = analysis.mean(time, values, window(*range(11), rule="as told"))
+    found = averages.mean(time, values, window(*range(11), rule="as told"))
     assert found.note == "still developing (it changes by +44.5% over the window); as told"
-    told = analysis.mean(time, values, window(*range(11), rule="still developing (drag grows); as told"))
+    told = averages.mean(time, values, window(*range(11), rule="still developing (drag grows); as told"))
     assert told.note == "still developing (drag grows); as told"
 
 
@@ -252,14 +252,14 @@ def test_the_strouhal_number_joins_scatter_and_difference_of_two_methods():
     edges = np.array([0.0, 5.1, 9.9, 15.2, 20.0, 24.9, 30.1])
     time = np.linspace(0, 31, 6201)
     lift = np.sin(2 * np.pi * 0.19 * time)
-    found = analysis.strouhal(time, lift, window(*edges, rule="as told"))
+    found = averages.strouhal(time, lift, window(*edges, rule="as told"))
     line, periods = stats.linregress(np.arange(7), edges), np.diff(edges)
     error = max(line.stderr, uncertainty_of_mean(periods, periods.mean()).standard)
     assert found == pytest.approx(0.19, abs=1e-3)
     assert found.uncertainty == pytest.approx(math.hypot(error / line.slope**2, found - 1 / line.slope), rel=1e-6)
     assert found.note == f"spectrum {found:.5f}, zero crossings {1 / line.slope:.5f}, 6 periods; as told"
-    assert not math.isnan(analysis.strouhal(time, lift, window(*edges[:3])))
-    assert math.isnan(analysis.strouhal(time, lift, window(*edges[:2])))
+    assert not math.isnan(averages.strouhal(time, lift, window(*edges[:3])))
+    assert math.isnan(averages.strouhal(time, lift, window(*edges[:2])))
 
 
 @pytest.mark.parametrize(
@@ -275,29 +275,29 @@ def test_the_strouhal_number_joins_scatter_and_difference_of_two_methods():
 )
 def test_a_mean_profile_is_over_the_sampled_part_of_the_window(start, end, mean, square):
     time = np.array([1.0, 2.0, 4.0, 5.0])
-    found = analysis.mean_profile(time, np.stack([time, 2 * time], axis=1), window(start, end))
+    found = averages.mean_profile(time, np.stack([time, 2 * time], axis=1), window(start, end))
     if mean is None:
         assert np.isnan(found).all() and found[0].shape == found[1].shape == (2,)
     else:
         assert found[0] == pytest.approx([mean, 2 * mean])
     if square is not None:
         assert found[1] == pytest.approx([math.sqrt(square), 2 * math.sqrt(square)])
-    assert analysis.mean_profile(time[:2], time[:2, None], window(0, 9))[0] == pytest.approx([1.5])
-    assert np.isnan(analysis.mean_profile(time[:1], time[:1, None], window(0, 9))).all()
+    assert averages.mean_profile(time[:2], time[:2, None], window(0, 9))[0] == pytest.approx([1.5])
+    assert np.isnan(averages.mean_profile(time[:1], time[:1, None], window(0, 9))).all()
 
 
 def test_decay_rate_and_its_standard_error():
     time, energy = np.array([0.0, 1.0, 2.0, 4.0]), np.array([1.0, 0.4, 0.1, 0.02])
     line = stats.linregress(time, np.log(energy))
-    found = analysis.decay_rate(time, energy)
+    found = averages.decay_rate(time, energy)
     assert (found, found.uncertainty) == pytest.approx((-line.slope, line.stderr))
-    assert analysis.decay_rate(time[:3], np.exp(-time[:3])) == pytest.approx(1)
-    for bad in (analysis.decay_rate(time[:2], energy[:2]), analysis.decay_rate(time, energy * (1, 1, 1, 0))):
+    assert averages.decay_rate(time[:3], np.exp(-time[:3])) == pytest.approx(1)
+    for bad in (averages.decay_rate(time[:2], energy[:2]), averages.decay_rate(time, energy * (1, 1, 1, 0))):
         assert math.isnan(bad) and bad.note == "a decay rate needs three or more positive values"
 
 
 def test_observed_order():
-    assert analysis.observed_order((10, 20), (0.04, -0.01)) == pytest.approx(2)
-    assert analysis.observed_order((10, 30), (27.0, 1.0)) == pytest.approx(3)
+    assert averages.observed_order((10, 20), (0.04, -0.01)) == pytest.approx(2)
+    assert averages.observed_order((10, 30), (27.0, 1.0)) == pytest.approx(3)
     for error in ((0.0, 1.0), (1.0, 0.0), (math.nan, 1.0), (1.0, math.nan)):
-        assert math.isnan(analysis.observed_order((10, 20), error))
+        assert math.isnan(averages.observed_order((10, 20), error))

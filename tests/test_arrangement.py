@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 import shapely
-from alsph import geometry, packing, thin
-from alsph.geometry import Kind, Solid, facing
+from alsph.geometry import lattice, packing, particles, solids, thin
+from alsph.geometry.particles import Kind
+from alsph.geometry.solids import Solid, facing
 from scipy.spatial import KDTree
 
 SQUARE = shapely.box(0, 0, 1, 1)
@@ -22,9 +23,9 @@ def same(points, others):
 
 def test_particles_of_a_kind_share_what_is_given_once():
     position = np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])
-    plain = geometry.particles(Kind.FLUID, position, 0.0)
+    plain = particles.particles(Kind.FLUID, position, 0.0)
     assert not any(plain[name].any() for name in ("velocity", "pressure", "kind", "body", "normal", "depth"))
-    full = geometry.particles(Kind.SOLID, position, (1, 2), pressure=0.5, body=7, normal=(0, 1), depth=[0.1, 0.2, 0.3])
+    full = particles.particles(Kind.SOLID, position, (1, 2), pressure=0.5, body=7, normal=(0, 1), depth=[0.1, 0.2, 0.3])
     assert full["position"].tolist() == position.tolist() and full["velocity"].tolist() == 3 * [[1.0, 2.0]]
     assert full["pressure"].tolist() == 3 * [0.5] and full["normal"].tolist() == 3 * [[0.0, 1.0]]
     assert full["depth"].tolist() == [0.1, 0.2, 0.3]
@@ -33,7 +34,7 @@ def test_particles_of_a_kind_share_what_is_given_once():
     assert all(full[name].dtype == float for name in ("velocity", "pressure", "normal", "depth"))
     full["velocity"][0] = full["pressure"][0] = 9  # each has its own
     assert full["velocity"][1, 0] == 1 and full["pressure"][1] == 0.5
-    both = geometry.join(plain, full)
+    both = particles.join(plain, full)
     assert both["body"].tolist() == [0, 0, 0, 7, 7, 7] and both["position"].shape == (6, 2)
 
 
@@ -49,32 +50,32 @@ def test_solids_are_chosen_moved_and_made_particles():
 
 
 def test_lattices():
-    assert geometry.lattice(np.array([0, 1]), np.array([5, 6, 7])).tolist() == [
+    assert lattice.lattice(np.array([0, 1]), np.array([5, 6, 7])).tolist() == [
         [0, 5], [0, 6], [0, 7], [1, 5], [1, 6], [1, 7]
     ]  # fmt: skip
-    assert geometry.cell_centres(3, 0.5).tolist() == [0.25, 0.75, 1.25]
-    assert geometry.symmetric_centres(4, 0.5).tolist() == [-0.75, -0.25, 0.25, 0.75]
-    assert geometry.symmetric_centres(3, 0.5).tolist() == [-0.5, 0, 0.5]
-    cells = geometry.cells(shapely.box(0.1, 0.2, 1.1, 0.7), 0.25, 1)
+    assert lattice.cell_centres(3, 0.5).tolist() == [0.25, 0.75, 1.25]
+    assert lattice.symmetric_centres(4, 0.5).tolist() == [-0.75, -0.25, 0.25, 0.75]
+    assert lattice.symmetric_centres(3, 0.5).tolist() == [-0.5, 0, 0.5]
+    cells = lattice.cells(shapely.box(0.1, 0.2, 1.1, 0.7), 0.25, 1)
     axes = 0.1 + 0.25 * np.arange(-0.5, 5), 0.2 + 0.25 * np.arange(-0.5, 3)
     assert cells == pytest.approx(np.array([[x, y] for x in axes[0] for y in axes[1]]))
-    assert len(geometry.cells(shapely.box(0.1, 0.2, 1.1, 0.7), 0.25)) == 4 * 2
+    assert len(lattice.cells(shapely.box(0.1, 0.2, 1.1, 0.7), 0.25)) == 4 * 2
 
 
 def test_rings_of_a_cylinder():
-    rings = geometry.cylinder_rings(0.5, 0.25, 4)  # π 0.375 / 0.25 = 4.7 in the upper half, and 1.6; then the centre
+    rings = solids.cylinder_rings(0.5, 0.25, 4)  # π 0.375 / 0.25 = 4.7 in the upper half, and 1.6; then the centre
     assert rings.depth.tolist() == 10 * [0.125] + 4 * [0.375]
     angles = np.radians([*np.arange(18, 360, 36), 45, 135, 225, 315])
     normals = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     for part, radius in ((slice(10), 0.375), (slice(10, 14), 0.125)):
         assert same(rings.position[part], radius * normals[part])
         assert rings.normal[part] == pytest.approx(rings.position[part] / radius)
-    assert len(geometry.cylinder_rings(0.375, 0.25, 4).depth) == 2 * round(np.pi)  # none in the centre
-    assert len(geometry.cylinder_rings(0.4, 0.75, 1).depth) == 4
+    assert len(solids.cylinder_rings(0.375, 0.25, 4).depth) == 2 * round(np.pi)  # none in the centre
+    assert len(solids.cylinder_rings(0.4, 0.75, 1).depth) == 4
 
 
 def test_walls_go_around_corners():
-    walls = geometry.walls(SQUARE, 0.25, 2)
+    walls = solids.walls(SQUARE, 0.25, 2)
     assert len(walls.depth) == 8 * 8 - 4 * 4 - 4  # but for the corners' corners, 0.53 off
     for place, normal, depth in (
         ((-0.125, 0.375), (1, 0), 0.125),
@@ -105,10 +106,10 @@ def test_points_along_a_curve_lie_on_its_corners(first):
     box = np.roll(np.array([[0, 0], [1, 0], [1, 0.5], [0.4, 0.5], [0, 0.5]]), first, axis=0)  # one of them is no corner
     x = np.arange(0, 1.1, 0.25)
     expected = np.concatenate([[[a, b] for a in x for b in (0, 0.5)], [[0, 0.25], [1, 0.25]]])
-    assert same(geometry._along(box, 0.25), expected)
-    assert same(geometry._along(box, 0.26), expected)
-    assert same(geometry._along(ring(11), 3.0), ring(11))  # they turn by 33 degrees
-    loop = geometry._along(np.roll(ring(13), first, axis=0), 1.08)  # by 28
+    assert same(solids._along(box, 0.25), expected)
+    assert same(solids._along(box, 0.26), expected)
+    assert same(solids._along(ring(11), 3.0), ring(11))  # they turn by 33 degrees
+    loop = solids._along(np.roll(ring(13), first, axis=0), 1.08)  # by 28
     assert len(loop) == 12
     outline = shapely.LinearRing(np.roll(ring(13), -first, axis=0))
     walked = np.sort([shapely.LinearRing(ring(13)).project(shapely.Point(point)) for point in loop])
@@ -117,7 +118,7 @@ def test_points_along_a_curve_lie_on_its_corners(first):
 
 def test_layers_leave_no_room_within_their_depth():
     plate, spacing = shapely.box(-0.26, -1.5, 0.26, 1.5), 0.2
-    place = geometry.body_layers(plate, spacing, 3).position
+    place = solids.body_layers(plate, spacing, 3).position
     outer = np.abs(np.abs(place) - [0.16, 1.4]).min(axis=1) < 1e-9
     assert np.count_nonzero(outer) == 2 * (14 + 2)  # 2.8 and 0.32 long
     x, y = np.meshgrid(np.linspace(-0.16, 0.16, 33), np.linspace(-1.4, 1.4, 281))
@@ -125,8 +126,8 @@ def test_layers_leave_no_room_within_their_depth():
     assert KDTree(place).query(points)[0].max() < 0.75 * spacing + 0.02
     assert KDTree(place).query(place[~outer], k=2)[0][:, 1].min() > 0.75 * spacing
     assert np.abs(place[~outer, 0]).max() < 0.06 and 9 < np.count_nonzero(~outer) < 18
-    assert len(geometry.body_layers(plate, spacing, 1).position) == 2 * (14 + 2)
-    thick = geometry.body_layers(shapely.box(-1, -1, 1, 1), spacing, 2)
+    assert len(solids.body_layers(plate, spacing, 1).position) == 2 * (14 + 2)
+    thick = solids.body_layers(shapely.box(-1, -1, 1, 1), spacing, 2)
     assert len(thick.depth) == 4 * 9 + 4 * 7 and thick.depth.max() == pytest.approx(0.3)
 
 
@@ -208,9 +209,9 @@ def test_second_faces_are_those_within_the_layers_of_a_thick_plate(lower):
     for layers, seconds in ((3, 0), (4, 2 * 14)):
         solid = thin.solid(plate, 0.1, layers)
         height = np.abs(solid.position[:, 1] - lower - 0.3)
-        lattice = geometry.cells(plate, 0.1)
-        depth = np.minimum(1 - np.abs(lattice[:, 0]), 0.3 - np.abs(lattice[:, 1] - lower - 0.3))
-        assert same(np.unique(solid.position.round(9), axis=0), lattice[depth < layers * 0.1])
+        points = lattice.cells(plate, 0.1)
+        depth = np.minimum(1 - np.abs(points[:, 0]), 0.3 - np.abs(points[:, 1] - lower - 0.3))
+        assert same(np.unique(solid.position.round(9), axis=0), points[depth < layers * 0.1])
         assert len(solid.depth) == np.count_nonzero(depth < layers * 0.1) + seconds
         second = np.abs(solid.depth - 0.35) < 1e-9
         assert np.count_nonzero(second) == seconds and height[second] == pytest.approx(0.05)
@@ -222,7 +223,7 @@ def test_second_faces_are_those_within_the_layers_of_a_thick_plate(lower):
 def test_a_row_on_the_axis_of_a_symmetric_body_is_there_once():
     solid = thin.solid(shapely.box(-0.25, -0.25, 0.25, 0.25), 0.1, 2)
     x = 0.1 * np.arange(-2, 3)
-    assert same(solid.position, geometry.lattice(x, x)[np.arange(25) != 12])
+    assert same(solid.position, lattice.lattice(x, x)[np.arange(25) != 12])
     axis = solid.position[:, 1] == 0
     assert np.count_nonzero(axis) == 4
     assert solid.normal[axis] == pytest.approx(np.sign(solid.position[axis]), abs=1e-6)
@@ -238,7 +239,7 @@ def test_the_arrangement_does_not_depend_on_the_unit_of_length(turn):
         spacing = 0.1 * unit
         carried = thin.carried(shapely.affinity.scale(body, unit, unit, origin=(0, 0)), spacing)
         solid = thin.solid(carried, spacing, 3)
-        cells = geometry.lattice(*2 * [geometry.symmetric_centres(24, spacing)])
+        cells = lattice.lattice(*2 * [lattice.symmetric_centres(24, spacing)])
         fluid = packing.pack(cells, carried, solid.position, spacing)
         found.append([carried.area / unit**2, solid.position / unit, solid.normal, solid.depth / unit, fluid / unit])
     assert all(one == pytest.approx(other, rel=1e-9, abs=1e-9) for one, other in zip(*found, strict=True))
@@ -253,9 +254,9 @@ def test_heights_above_a_body():
 
 
 def test_cells_around_a_rectangle_continue_its_lattice():
-    beyond = packing._beyond(geometry.cells(shapely.box(1, 2, 1.75, 2.5), 0.25), 0.25)
-    whole = geometry.cells(shapely.box(0.25, 1.25, 2.5, 3.25), 0.25)  # three more on each side
-    assert same(beyond, whole[~geometry.inside(shapely.box(1, 2, 1.75, 2.5), whole)])
+    beyond = packing._beyond(lattice.cells(shapely.box(1, 2, 1.75, 2.5), 0.25), 0.25)
+    whole = lattice.cells(shapely.box(0.25, 1.25, 2.5, 3.25), 0.25)  # three more on each side
+    assert same(beyond, whole[~lattice.inside(shapely.box(1, 2, 1.75, 2.5), whole)])
 
 
 def test_the_crowd_is_a_sum_of_gaussians():
@@ -283,12 +284,12 @@ def test_particles_next_to_a_body_are_moved_out_of_it():
 
 def test_fluid_that_is_even_stays_and_the_rest_moves_apart():
     spacing, body = 0.1, shapely.box(-0.2, -0.2, 0.2, 0.2)
-    cells = geometry.lattice(*2 * [geometry.symmetric_centres(20, spacing)])
-    solid = cells[geometry.inside(body, cells)]
+    cells = lattice.lattice(*2 * [lattice.symmetric_centres(20, spacing)])
+    solid = cells[lattice.inside(body, cells)]
     fluid = packing.pack(cells, body, solid, spacing)
-    assert same(fluid, cells[~geometry.inside(body, cells)])
+    assert same(fluid, cells[~lattice.inside(body, cells)])
     wider = shapely.box(-0.25, -0.25, 0.25, 0.25)
-    solid = geometry.body_layers(wider, spacing, 3).position
+    solid = solids.body_layers(wider, spacing, 3).position
     fluid = packing.pack(cells, wider, solid, spacing)
     assert len(fluid) == 376  # 400 - 25 are not in pairs
     assert same(fluid, fluid * (1, -1)) and packing._height(wider, fluid).min() > 0.39 * spacing

@@ -4,9 +4,9 @@ import math
 
 import pytest
 from alsph import config
-from alsph.autotune import autotune
 from alsph.cases import TaylorGreen
 from alsph.errors import ConfigError
+from alsph.study.autotune import autotune
 
 
 @pytest.fixture(scope="module")

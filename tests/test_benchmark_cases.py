@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 import shapely
-from alsph import plotting, reference, sampling
+from alsph import plotting, reference
+from alsph.analysis import sampling
 from alsph.cases import (
     CASES,
     BackwardFacingStep,
@@ -19,7 +20,7 @@ from alsph.cases import (
 )
 from alsph.cases.backward_facing_step import last_upward_zero
 from alsph.errors import ConfigError
-from alsph.geometry import Kind
+from alsph.geometry.particles import Kind
 from scipy.spatial import KDTree
 from synthetic import write_flow
 

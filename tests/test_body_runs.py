@@ -8,12 +8,12 @@ import tomllib
 import pytest
 from alsph import config, study
 from alsph.cases import Body, Cylinder
-from alsph.checkpoint import read as read_checkpoint
-from alsph.checkpoint import write as write_checkpoint
 from alsph.config import Config
 from alsph.errors import ConfigError, RunFolderError
-from alsph.results import Run
-from alsph.run import resume
+from alsph.folder.checkpoint import read as read_checkpoint
+from alsph.folder.checkpoint import write as write_checkpoint
+from alsph.results.run import Run
+from alsph.running.start import resume
 from alsph.study import Study, Sweep
 
 SQUARE = "-0.5 -0.5\n0.5 -0.5\n0.5 0.5\n-0.5 0.5\n"

@@ -5,7 +5,8 @@ import pytest
 from alsph import _alsph
 from alsph.cases import CASES, Cylinder, TaylorGreen
 from alsph.errors import ConfigError
-from alsph.geometry import Kind, cylinder_rings
+from alsph.geometry.particles import Kind
+from alsph.geometry.solids import cylinder_rings
 
 
 def mirrored(points):

@@ -3,11 +3,11 @@
 import math
 
 import pytest
-from alsph import convergence
 from alsph.cases import TaylorGreen
 from alsph.config import Config, RunSettings
-from alsph.convergence import converge, grid_convergence
 from alsph.errors import ConfigError
+from alsph.study import convergence
+from alsph.study.convergence import converge, grid_convergence
 from hypothesis import given
 from hypothesis import strategies as st
 

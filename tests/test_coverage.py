@@ -4,13 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from alsph import Run, analysis, convergence, plotting
-from alsph.convergence import grid_convergence
-from alsph.measures import Measure
+from alsph import Run, plotting
+from alsph.analysis import averages
+from alsph.analysis.measures import Measure
+from alsph.analysis.signals import smoothed
+from alsph.analysis.uncertainty import trend, uncertainty_of_mean
 from alsph.plotting import pressure_coefficient
-from alsph.signals import smoothed
-from alsph.uncertainty import trend, uncertainty_of_mean
-from alsph.validation import Entry, Row
+from alsph.study import convergence
+from alsph.study.convergence import grid_convergence
+from alsph.study.validation import Entry, Row
 from battery import ESTIMATED, SETTLED, autoregressive_series, drifting, growing, relaxing, shedding, times, transient
 from scipy.ndimage import gaussian_filter1d
 from synthetic import write_run
@@ -20,8 +22,8 @@ def measured(signal, end, seed, thickness=1.0):
     rng = np.random.default_rng(seed)
     time = times(rng, end)
     drag, lift = signal(rng, time)
-    window = analysis.averaging_window(time, drag, lift, thickness)
-    return window, analysis.mean(time, drag, window), analysis.strouhal(time, lift, window)
+    window = averages.averaging_window(time, drag, lift, thickness)
+    return window, averages.mean(time, drag, window), averages.strouhal(time, lift, window)
 
 
 @pytest.mark.parametrize("count", [10, 20, 40])
@@ -82,8 +84,8 @@ def test_coverage_of_whole_records(name):
 def test_a_drag_that_relaxes_says_so_and_is_covered():
     time = np.arange(0, 40, 0.005)
     drag = 1.3 + 0.2 * np.exp(-time / 20)
-    window = analysis.averaging_window(time, drag, 0 * time)
-    mean = analysis.mean(time, drag, window)
+    window = averages.averaging_window(time, drag, 0 * time)
+    mean = averages.mean(time, drag, window)
     assert window.developing and mean.developing
     assert abs(mean - 1.3) < mean.uncertainty < 0.1
     assert "still developing (drag changes by" in mean.note and str(mean).endswith("(still developing)")
@@ -198,8 +200,8 @@ def test_what_still_develops_is_said_wherever_it_is_shown(developing):
 def test_a_lift_that_grows_makes_the_drag_before_it_unknown(start):
     time = np.arange(0, 25, 0.005)
     lift = start * np.exp(0.2 * time) * np.sin(2 * np.pi * 0.2 * time)
-    window = analysis.averaging_window(time, 1.2 + 0.1 * lift**2, lift)
-    mean = analysis.mean(time, 1.2 + 0.1 * lift**2, window)
+    window = averages.averaging_window(time, 1.2 + 0.1 * lift**2, lift)
+    mean = averages.mean(time, 1.2 + 0.1 * lift**2, window)
     assert window.growing and mean.developing and mean.uncertainty == math.inf
 
 
@@ -207,23 +209,23 @@ def test_a_slow_beat_or_a_tiny_drift_leaves_the_mean_known():
     time = np.arange(0, 60, 0.008)
     beat = np.sin(2 * np.pi * time / 150 - 2)
     drag, lift = 1.48 + 0.01 * beat, 0.5 * (1 + 0.02 * beat) * np.sin(0.4 * np.pi * time)
-    mean = analysis.mean(time, drag, analysis.averaging_window(time, drag, lift))
+    mean = averages.mean(time, drag, averages.averaging_window(time, drag, lift))
     assert mean.developing and abs(mean - 1.48) < mean.uncertainty < 0.1
     drag = 1.48 + 1e-6 * np.exp(time / 30)
-    mean = analysis.mean(time, drag, analysis.averaging_window(time, drag, 0 * time))
+    mean = averages.mean(time, drag, averages.averaging_window(time, drag, 0 * time))
     assert not mean.developing and mean.uncertainty < 1e-3
 
 
 def test_round_off_that_wanders_is_no_development():
     time = np.arange(0, 40, 0.01)
     wander = 1e-13 * np.cumsum(np.random.default_rng(0).normal(size=len(time)))
-    window = analysis.averaging_window(time, 1.3 + 0 * time, wander)
+    window = averages.averaging_window(time, 1.3 + 0 * time, wander)
     assert not window.developing and window.periods == 0
 
 
 def test_tables_say_what_still_develops():
-    early = analysis.Estimate(1.25, math.inf, "still developing (lift grows)")
+    early = averages.Estimate(1.25, math.inf, "still developing (lift grows)")
     found = grid_convergence("mean drag coefficient", [10, 20, 40], [1.5, 1.3, early])
     assert "1.25 (still developing)" in str(convergence.Report(None, None, [found]))
     assert str(early) == "1.25 ± unknown (still developing)"
-    assert str(analysis.Estimate(1.25, math.inf, "too few periods")) == "1.25 ± unknown"
+    assert str(averages.Estimate(1.25, math.inf, "too few periods")) == "1.25 ± unknown"

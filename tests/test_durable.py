@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from alsph import durable
-from alsph.durable import _Overlay, growing, recover, replacing, viewing
+from alsph.folder import durable
+from alsph.folder.durable import _Overlay, growing, recover, replacing, viewing
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -180,7 +180,7 @@ def test_a_process_ends_well_after_a_file_that_hdf5_cannot_close(tmp_path):
     script = """
 import sys
 from pathlib import Path
-from alsph.durable import _Overlay, growing
+from alsph.folder.durable import _Overlay, growing
 
 def fail(self, start, end):
     raise MemoryError

@@ -10,11 +10,13 @@ import time as clock
 import h5py
 import numpy as np
 import pytest
-from alsph import Run, checkpoint, reading
+from alsph import Run
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError, RunFolderError
-from alsph.io import RunFolder
-from alsph.run import Control, complete, resume
+from alsph.folder import checkpoint, reading
+from alsph.folder.run_folder import RunFolder
+from alsph.running.control import Control
+from alsph.running.start import complete, resume
 from alsph.study.state import state
 from processes import MAIN, command, wait_until_stepping, write_case
 

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 import shapely
-from alsph import thin
 from alsph.cases.body import _naca0012
-from alsph.geometry import body_layers, cells, cylinder_rings, inside, walls
+from alsph.geometry import thin
+from alsph.geometry.lattice import cells, inside
+from alsph.geometry.solids import body_layers, cylinder_rings, walls
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import KDTree

@@ -6,10 +6,11 @@ import shutil
 import h5py
 import numpy as np
 import pytest
-from alsph import vtkhdf
+from alsph import config
 from alsph.config import Config, RunSettings
 from alsph.errors import RunFolderError
-from alsph.io import RunFolder, flatten
+from alsph.folder import vtkhdf
+from alsph.folder.run_folder import RunFolder, flatten
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
@@ -189,9 +190,9 @@ def test_foreign_and_damaged_folders(folder, name, content, message):
     if content:
         path.write_text(content)
     with pytest.raises(RunFolderError, match=message):
-        folder.config()
+        config.of_run(folder.path)
         folder.read_checkpoint()
 
 
 def test_resolved_configuration_names_the_end(folder):
-    assert folder.config().run == RunSettings(until=60.0)
+    assert config.of_run(folder.path).run == RunSettings(until=60.0)

@@ -1,7 +1,11 @@
-"""The engine's files and folders lie on floors: each uses those below it, and none uses another of its own floor."""
+"""Engine and package lie on floors: a file or folder uses those below it, and none another of its own floor."""
 
+import ast
+import graphlib
 import re
 from pathlib import Path
+
+import pytest
 
 RUST = Path(__file__).parents[1] / "rust"
 
@@ -46,3 +50,89 @@ def test_the_engine_has_no_arrow_up():
 
 def test_an_arrow_up_is_noticed():
     assert used("use crate::scheme::Alsph;\n/// [`crate::report`]\n#[cfg(test)]\nuse crate::kernel;") == {"scheme"}
+
+
+PYTHON = Path(__file__).parents[1] / "python" / "alsph"
+
+PYTHON_FLOORS = (
+    ("_alsph", "arrays", "text"),
+    ("errors",),
+    ("memory", "parameters", "tables"),
+    ("geometry", "reference"),
+    ("analysis", "engine"),
+    ("cases", "folder"),
+    ("config",),
+    ("results",),
+    ("plotting", "running"),
+    ("study",),
+    ("cli", "__init__"),
+)
+PYTHON_FLOOR = {name: height for height, names in enumerate(PYTHON_FLOORS) for name in names}
+
+DOORS = {
+    ("cases.base", "running.beginning"),  # Case.simulation
+    ("cases.base", "running.control"),  # Case.run
+    ("cases.base", "running.start"),
+    ("cases.base", "results.run"),  # the type of what Case.run returns
+    ("results.run", "plotting"),  # Run.plot_...
+}
+"""Where a class of a lower floor offers what a higher one does, by an import that is made when it is called."""
+
+
+def imported(source: str) -> set[str]:
+    """Return the files of the package that a source file imports, wherever in it, by their dotted names in it."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "alsph":
+            base = node.module.removeprefix("alsph").removeprefix(".")
+            names = [".".join(filter(None, (base, each.name))) for each in node.names]
+            found |= {name if is_file(name) else base or "__init__" for name in names}
+        elif isinstance(node, ast.Import):
+            found |= {each.name.removeprefix("alsph.") for each in node.names if each.name.startswith("alsph.")}
+    return found
+
+
+def is_file(name: str) -> bool:
+    """Whether the dotted name is that of a file or folder of the package, its compiled module included."""
+    path = PYTHON / name.replace(".", "/")
+    return name == "_alsph" or path.is_dir() or path.with_suffix(".py").is_file()
+
+
+@pytest.fixture(scope="module")
+def imports():
+    """Files of the package and what each imports, but through the doors."""
+    found = {}
+    for path in PYTHON.rglob("*.py"):
+        name = ".".join(path.relative_to(PYTHON).with_suffix("").parts).removesuffix(".__init__")
+        found[name] = imported(path.read_text()) - {name}
+    assert DOORS <= {(name, other) for name, others in found.items() for other in others}
+    return {name: {other for other in others if (name, other) not in DOORS} for name, others in found.items()}
+
+
+def test_the_package_has_no_arrow_up(imports):
+    folder = {name: name.split(".")[0] for others in imports.values() for name in others} | {
+        name: name.split(".")[0] for name in imports
+    }
+    assert set(folder.values()) == set(PYTHON_FLOOR)
+    up = [
+        f"{name} imports {other}"
+        for name, others in sorted(imports.items())
+        for other in sorted(others)
+        if folder[name] != folder[other] and PYTHON_FLOOR[folder[other]] >= PYTHON_FLOOR[folder[name]]
+    ]
+    assert not up
+
+
+def test_the_package_has_no_circle(imports):
+    assert [*graphlib.TopologicalSorter(imports).static_order()]
+
+
+def test_only_the_engines_files_know_the_compiled_module(imports):
+    knowing = {name for name, others in imports.items() if "_alsph" in others}
+    assert knowing == {"__init__", "engine.simulation"}
+
+
+def test_imports_are_found_wherever_they_are():
+    source = "from alsph import study, Run\nfrom alsph.engine.simulation import Simulation\n"
+    source += "def f():\n    import alsph.text"
+    assert imported(source) == {"study", "__init__", "engine.simulation", "text"}

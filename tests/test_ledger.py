@@ -3,7 +3,7 @@ import pytest
 from alsph import Run
 from alsph.cases import Cylinder, TaylorGreen
 from alsph.config import Config, RunSettings
-from alsph.io import RunFolder
+from alsph.folder.run_folder import RunFolder
 from synthetic import history, write_run
 
 

@@ -9,7 +9,7 @@ import pytest
 import shapely
 from alsph.cases import Body
 from alsph.errors import ConfigError
-from alsph.outline import Outline
+from alsph.geometry.outline import Outline
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 

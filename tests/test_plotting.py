@@ -3,9 +3,10 @@ import sys
 import numpy as np
 import pytest
 from alsph import Run, plotting
+from alsph.analysis.loads import PressureCoefficient
 from alsph.errors import ConfigError
-from alsph.reading import Snapshot
-from alsph.results import PressureCoefficient
+from alsph.geometry.particles import Snapshot
+from alsph.plotting.pictures import _limit
 from matplotlib.figure import Figure
 from synthetic import write_run
 
@@ -51,9 +52,9 @@ def test_a_picture_of_fluid_without_a_body_and_without_variation():
 def test_a_field_in_few_pixels_has_a_scale_of_its_own():
     picture = np.full((100, 100), 1e-3)
     picture[:5, :5] = 4.0
-    assert plotting._limit(picture) == pytest.approx(4.0, abs=0.51)
+    assert _limit(picture) == pytest.approx(4.0, abs=0.51)
     picture[:] = np.linspace(0, 1, 10_000).reshape(100, 100)
-    assert plotting._limit(picture) == 1.0
+    assert _limit(picture) == 1.0
 
 
 def test_fields_that_cannot_be_drawn(run):

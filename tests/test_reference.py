@@ -4,8 +4,8 @@ import math
 import numpy as np
 import pytest
 from alsph import Run, reference
+from alsph.analysis.measures import Measure
 from alsph.cases import Cylinder, TaylorGreen
-from alsph.measures import Measure
 from synthetic import DRAG, LIFT, STROUHAL, write_run
 
 FORCES = list(reference.COLUMNS)

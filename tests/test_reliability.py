@@ -14,14 +14,14 @@ import alsph
 import h5py
 import numpy as np
 import pytest
-from alsph import checkpoint, reading
 from alsph.cases import Cylinder, TaylorGreen
 from alsph.config import Config, RunSettings
+from alsph.engine.simulation import Simulation, next_multiple
 from alsph.errors import ConfigError, RunFolderError, SolverError, WalltimeError
-from alsph.io import RunFolder
-from alsph.progress import seconds_of
-from alsph.run import Control, complete, resume, start
-from alsph.simulation import Simulation, next_multiple
+from alsph.folder import checkpoint, reading
+from alsph.folder.run_folder import RunFolder
+from alsph.running.control import Control, seconds_of
+from alsph.running.start import complete, resume, start
 from processes import bits, command, wait_until_stepping, write_case
 
 CASES = {
@@ -108,8 +108,8 @@ def test_a_run_goes_on_when_nobody_reads_its_progress(tmp_path, small):
     """As with ``alsph run ... | head -1``."""
     file, path = write_case(tmp_path / "case.toml", small, until=0.3), tmp_path / "run"
     script = f"""
-import alsph.progress
-alsph.progress.PLAIN_SECONDS = 0.0
+import alsph.running.progress
+alsph.running.progress.PLAIN_SECONDS = 0.0
 import sys
 sys.argv = ["alsph", "run", {str(file)!r}, "-o", {str(path)!r}]
 from alsph.cli import main

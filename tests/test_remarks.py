@@ -4,9 +4,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from alsph import Run, remarks
-from alsph.cases import CASES, BackwardFacingStep, Body, Cavity, Cylinder, Poiseuille, TaylorGreen
-from alsph.thin import carried
+from alsph import Run
+from alsph.cases import CASES, BackwardFacingStep, Body, Cavity, Cylinder, Poiseuille, TaylorGreen, remarks
+from alsph.geometry.thin import carried
+from alsph.results.outcome import outcome
 from shapely import affinity
 from synthetic import write_run
 
@@ -143,11 +144,11 @@ def test_remarks_of_a_run(tmp_path):
     assert run.summary()["remark 1"] == run.remarks[0]
     short = Run(tmp_path / "run")
     short.window = replace(short.window, edges=short.window.edges[:5], periods=4)
-    assert remarks.outcome(short) == ["few periods: averaged over 4 of shedding; a longer run tells more"]
+    assert outcome(short, 60) == ["few periods: averaged over 4 of shedding; a longer run tells more"]
     short.window = replace(short.window, settled=False, rule="shedding not periodic yet")
-    assert remarks.outcome(short) == ["not settled: shedding not periodic yet"]
+    assert outcome(short, 60) == ["not settled: shedding not periodic yet"]
     short.window = replace(short.window, rule="still developing (drag changes by 2 %); later half of the periods")
-    assert remarks.outcome(short) == ["still developing: drag changes by 2 %; later half of the periods"]
+    assert outcome(short, 60) == ["still developing: drag changes by 2 %; later half of the periods"]
     info = tmp_path / "run" / "run.json"
     info.write_text('{"status": "diverged", "retries": [{"step": 3, "time_step": 0.01}]}')
     lines = (tmp_path / "run" / "history.csv").read_text().splitlines(keepends=True)

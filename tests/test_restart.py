@@ -9,14 +9,15 @@ import alsph
 import numpy as np
 import pytest
 from alsph import config
-from alsph.beginning import changed, remarks, unlike
 from alsph.cases import CASES, BackwardFacingStep, Cylinder, TaylorGreen
 from alsph.config import Config, RunSettings
+from alsph.engine.inflow import Prescription, backflow, difference, fingerprint
 from alsph.errors import ConfigError, RunFolderError, SolverError
-from alsph.geometry import Kind
-from alsph.inflow import Prescription, backflow, difference, fingerprint
-from alsph.io import RunFolder
-from alsph.run import Control, complete, resume, start
+from alsph.folder.run_folder import RunFolder
+from alsph.geometry.particles import Kind
+from alsph.running.beginning import changed, remarks, unlike
+from alsph.running.control import Control
+from alsph.running.start import complete, resume, start
 from alsph.study.declaration import digest
 from alsph.study.worker import perform
 from processes import bits
@@ -432,11 +433,11 @@ def test_the_path_of_a_beginning_is_the_same_however_it_is_written_and_wherever_
     folder.path.mkdir()
     Config(TaylorGreen(resolution=8), RunSettings(initial_run=path)).save(folder.path / "case.toml")
     info = {"start": {"initial_run": path}}
-    assert folder.config().run.initial_run == path and changed(folder.config(), info) == []
+    assert config.of_run(folder.path).run.initial_run == path and changed(config.of_run(folder.path), info) == []
     (tmp_path / "initial").mkdir()
     monkeypatch.chdir(tmp_path)
-    assert changed(folder.config(), info) == []
-    assert changed(folder.config(), {"start": {"initial_run": "other"}})
+    assert changed(config.of_run(folder.path), info) == []
+    assert changed(config.of_run(folder.path), {"start": {"initial_run": "other"}})
 
 
 def test_a_run_may_take_the_place_of_the_one_that_it_begins_with(tmp_path, small):

@@ -5,12 +5,14 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
-from alsph import Run, analysis, reading, remarks, sampling
-from alsph.cases import Body, Couette, Cylinder
+from alsph import Run
+from alsph.analysis import averages, sampling
+from alsph.analysis.measures import Measure, Profile
+from alsph.cases import Body, Couette, Cylinder, remarks
 from alsph.config import Config
 from alsph.errors import ConfigError, RunFolderError
-from alsph.io import RunFolder
-from alsph.measures import Measure, Profile
+from alsph.folder import reading
+from alsph.folder.run_folder import RunFolder
 from synthetic import CIRCULATION, DRAG, LIFT, STROUHAL, history, signals, write_run
 
 
@@ -298,7 +300,7 @@ def test_the_summary_of_a_run(folder):
 def test_references_stand_behind_their_measures(folder):
     run = Run(folder)
     nothing = Measure("drag", 1.25, math.nan, 0.1), Measure("symmetry", 0.01, 0.0, 0.1)
-    run.measures = [Measure("lift", analysis.Estimate(0.5, 0.1), -2.0, 0.1), *nothing]
+    run.measures = [Measure("lift", averages.Estimate(0.5, 0.1), -2.0, 0.1), *nothing]
     found = [(name, str(value)) for name, value in run.summary().items()]
     first = found.index(("lift", "0.50 ± 0.10"))
     assert found[first + 1 : first + 4] == [("lift, reference", "-2"), ("drag", "1.25"), ("symmetry", "0.01")]
@@ -309,7 +311,7 @@ def test_the_momentum_balance_is_of_the_snapshots_in_the_window(folder):
     """A stream that is sped up by a pressure gradient, without a body: what comes in stays in."""
     run = Run(folder)
     run.times = np.array([0.0, 1.0, 2.0, 4.0, 9.0])
-    run.window = analysis.Window(np.array([1.0, 4.0]), 1, True, "")
+    run.window = averages.Window(np.array([1.0, 4.0]), 1, True, "")
     first = run.snapshot(0.0)
     position = first.position[first.fluid]
     solid = np.arange(len(position)) % 7 == 0
@@ -334,7 +336,7 @@ def test_the_momentum_balance_is_of_the_snapshots_in_the_window(folder):
     # trapezia of the pressure's push, 2 V t: (1.5 + 2 * 3) / 3 = 2.5
     assert balance - unpushed == pytest.approx(2 * 4 * 2.5 * np.array([1.0, 0.5]), rel=1e-6)
     assert unpushed == pytest.approx(-whole * 6 / 7, rel=0.02)
-    run.window = analysis.Window(np.array([1.5, 3.0]), 1, True, "")
+    run.window = averages.Window(np.array([1.5, 3.0]), 1, True, "")
     assert np.isnan(run.momentum_balance(*box)).all() and len(run.momentum_balance(*box)) == 2
 
 

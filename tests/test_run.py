@@ -9,11 +9,13 @@ import alsph
 import h5py
 import numpy as np
 import pytest
-from alsph import config, io
+from alsph import config
 from alsph.cases import Cylinder, TaylorGreen
+from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError, Interrupted, RunFolderError, SolverError
-from alsph.run import Control, _interruptible, resume, start
-from alsph.simulation import Simulation
+from alsph.folder import run_folder
+from alsph.running.control import Control, interruptible
+from alsph.running.start import resume, start
 
 HISTORY_COLUMNS = (
     "step time time_step iterations converged divergence_max divergence_mean divergence_sum velocity_max "
@@ -82,7 +84,7 @@ def test_resumed_run_is_the_uninterrupted_run_to_the_last_bit(small, tmp_path):
         assert files == {path.name: path.read_bytes() for path in part.path.iterdir()}
     part = resume(part.path, until=0.2, threads=1, progress=False)
     assert (part.path / "history.csv").read_text() == (whole.path / "history.csv").read_text()
-    assert same(*(by_id(io.RunFolder(run.path).read_checkpoint().state) for run in (whole, part)))
+    assert same(*(by_id(run_folder.RunFolder(run.path).read_checkpoint().state) for run in (whole, part)))
     assert part.times.tolist() == whole.times.tolist()
     assert config.load(part.path / "case.toml").run.until == 0.2
 
@@ -106,7 +108,7 @@ def test_diverged_run_keeps_the_last_good_state(small, tmp_path):
     info = json.loads((tmp_path / "run" / "run.json").read_text())
     assert info["status"] == "diverged"
     assert "last good state" in info["message"]
-    assert np.isfinite(io.RunFolder(tmp_path / "run").read_checkpoint().state["velocity"]).all()
+    assert np.isfinite(run_folder.RunFolder(tmp_path / "run").read_checkpoint().state["velocity"]).all()
     assert "warning: time_step = 0.3" in (tmp_path / "run" / "run.log").read_text()
     assert alsph.open_run(tmp_path / "run").status == "diverged"
 
@@ -120,13 +122,13 @@ def test_a_run_that_does_not_know_all_parameters_is_not_resumed(small, tmp_path)
 
 
 def test_disk_that_fills_up_leaves_a_folder_that_resumes(small, tmp_path, monkeypatch):
-    usage, append = shutil.disk_usage(tmp_path), io.RunFolder.append_surface
+    usage, append = shutil.disk_usage(tmp_path), run_folder.RunFolder.append_surface
 
     def fill(self, *arguments):
         monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=10))
         append(self, *arguments)
 
-    monkeypatch.setattr(io.RunFolder, "append_surface", fill)
+    monkeypatch.setattr(run_folder.RunFolder, "append_surface", fill)
     with pytest.raises(RunFolderError, match="disk full"):
         small.run(tmp_path / "run", until=0.2, progress=False)
     monkeypatch.undo()
@@ -157,9 +159,9 @@ def test_existing_folder_is_replaced_only_by_force(small, tmp_path):
 
 
 def test_a_run_that_is_going_on_is_left_alone(small, tmp_path):
-    folder = io.RunFolder(small.run(tmp_path / "run", until=0.05, progress=False).path)
+    folder = run_folder.RunFolder(small.run(tmp_path / "run", until=0.05, progress=False).path)
     assert not folder.is_busy()
-    with io.RunFolder(folder.path).claimed():
+    with run_folder.RunFolder(folder.path).claimed():
         assert folder.is_busy()
         with pytest.raises(RunFolderError, match=f"process {os.getpid()} on .* is still running it; wait for it"):
             resume(folder.path, until=0.1)
@@ -171,15 +173,15 @@ def test_a_run_that_is_going_on_is_left_alone(small, tmp_path):
 @pytest.mark.parametrize("system", ["fcntl", "none"])
 def test_who_looks_is_not_seen_as_busy(tmp_path, monkeypatch, system):
     if system == "none":
-        monkeypatch.setattr(io, "fcntl", None)
-    folder = io.RunFolder(tmp_path / "run")
+        monkeypatch.setattr(run_folder, "fcntl", None)
+    folder = run_folder.RunFolder(tmp_path / "run")
     assert not folder.is_busy()
     with folder.claimed():
         assert folder.is_busy()
     assert not folder.is_busy()
     if system == "fcntl":
-        with (folder.path / io.LOCK).open("rb") as file:
-            io.fcntl.flock(file, io.fcntl.LOCK_SH)
+        with (folder.path / run_folder.LOCK).open("rb") as file:
+            run_folder.fcntl.flock(file, run_folder.fcntl.LOCK_SH)
             assert not folder.is_busy()
 
 
@@ -191,14 +193,14 @@ def test_a_folder_that_is_removed_under_a_run_is_not_written_to(small, tmp_path,
         if (path / "case.toml").exists():
             shutil.rmtree(path)
         if made_again:
-            with io.RunFolder(path).claimed():
+            with run_folder.RunFolder(path).claimed():
                 pass
         return run_until(self, *arguments)
 
     monkeypatch.setattr(Simulation, "run_until", removed)
     with pytest.raises(RunFolderError, match="removed or replaced under the run"):
         small.run(path, until=0.1, progress=False)
-    assert [file.name for file in path.glob("*")] == ([io.LOCK] if made_again else [])
+    assert [file.name for file in path.glob("*")] == ([run_folder.LOCK] if made_again else [])
 
 
 def test_run_in_a_thread(small, tmp_path):
@@ -210,7 +212,7 @@ def test_run_in_a_thread(small, tmp_path):
 
 
 def test_plain_progress(small, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("alsph.progress.PLAIN_SECONDS", 0.0)
+    monkeypatch.setattr("alsph.running.progress.PLAIN_SECONDS", 0.0)
     small.run(tmp_path / "run", until=0.1)
     printed = capsys.readouterr().out.splitlines()
     remarks = [f"remark: {remark}" for remark in small.remarks()]
@@ -354,7 +356,7 @@ def test_as_much_leaves_as_enters(small):
 
 def test_only_a_second_wish_to_stop_interrupts_at_once(monkeypatch):
     interrupted = threading.Event()
-    with _interruptible(interrupted) as signals:
+    with interruptible(interrupted) as signals:
         signal.raise_signal(signal.SIGINT)
         signal.raise_signal(signal.SIGINT)  # the echo from a wrapper that passes the terminal's Ctrl-C on
         assert interrupted.is_set() and signals == [signal.SIGINT, signal.SIGINT]

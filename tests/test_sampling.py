@@ -4,9 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from alsph import sampling
+from alsph.analysis import sampling
 from alsph.errors import ConfigError
-from alsph.geometry import Kind, cell_centres, lattice
+from alsph.geometry.lattice import cell_centres, lattice
+from alsph.geometry.particles import Kind
 
 SPACING = 0.1
 

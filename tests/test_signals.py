@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from alsph.signals import (
+from alsph.analysis.signals import (
     amplitude_spectrum,
     batch_means,
     cycle_amplitudes,

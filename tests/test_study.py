@@ -206,7 +206,7 @@ def test_a_run_that_failed_before_is_tried_again(tmp_path):
 HOLDER = """
 import sys, time
 from pathlib import Path
-from alsph.io import RunFolder
+from alsph.folder.run_folder import RunFolder
 
 folder = RunFolder(Path(sys.argv[1]))
 with folder.claimed():

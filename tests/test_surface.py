@@ -8,8 +8,8 @@ from alsph import Run
 from alsph.cases import Body, Cylinder
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError, RunFolderError
-from alsph.io import RunFolder
-from alsph.surface import along, circle, edges
+from alsph.folder.run_folder import RunFolder
+from alsph.geometry.surface import along, circle, edges
 from shapely import affinity
 from synthetic import history, write_run
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 from alsph import Run, errors, study
-from alsph.io import RunFolder
+from alsph.folder.run_folder import RunFolder
 from alsph.study.board import overview
 from alsph.study.declaration import Study
 from alsph.study.state import states

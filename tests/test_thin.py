@@ -3,10 +3,10 @@ import time as clock
 import numpy as np
 import pytest
 import shapely
-from alsph import thin
 from alsph.cases import Body
 from alsph.errors import ConfigError
-from alsph.geometry import Kind
+from alsph.geometry import thin
+from alsph.geometry.particles import Kind
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import KDTree

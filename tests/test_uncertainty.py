@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from alsph.uncertainty import CORRELATIONS, EXTRAPOLATION, LEAN, RELAXATION_TIMES, trend, uncertainty_of_mean
+from alsph.analysis.uncertainty import CORRELATIONS, EXTRAPOLATION, LEAN, RELAXATION_TIMES, trend, uncertainty_of_mean
 from battery import autoregressive_series
 from scipy import optimize, stats
 

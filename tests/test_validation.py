@@ -2,12 +2,14 @@ import math
 from dataclasses import replace
 
 import pytest
-from alsph import Run, analysis, validate, validation
+from alsph import Run, validate
+from alsph.analysis import averages
+from alsph.analysis.measures import Measure
 from alsph.cases import TaylorGreen
 from alsph.errors import ConfigError, SolverError
-from alsph.measures import Measure
-from alsph.run import _Driver
-from alsph.validation import Entry
+from alsph.running.driver import Driver
+from alsph.study import validation
+from alsph.study.validation import Entry
 
 FAST = (Entry("taylor_green", (10, 20), until=0.1),)
 STRICT = 1e-9
@@ -32,12 +34,12 @@ def measuring(monkeypatch, measures):
 
 @pytest.mark.parametrize("order", [1.0, 2.0, 3.5])
 def test_observed_order_is_recovered(order):
-    assert analysis.observed_order((25, 60), (25**-order, -(60**-order))) == pytest.approx(order)
+    assert averages.observed_order((25, 60), (25**-order, -(60**-order))) == pytest.approx(order)
 
 
 @pytest.mark.parametrize("error", [(0.0, 0.1), (0.1, 0.0), (math.nan, 0.1), (0.1, math.nan)])
 def test_no_order_without_two_errors(error):
-    assert math.isnan(analysis.observed_order((25, 50), error))
+    assert math.isnan(averages.observed_order((25, 50), error))
 
 
 def test_report(finished):
@@ -106,7 +108,7 @@ def test_finer_resolutions_may_go_on_with_the_flow_of_coarser_ones(tmp_path):
 
 @pytest.mark.parametrize("lost", [[], ["checkpoint.h5"], ["checkpoint.h5", "run.json"]])
 def test_a_validation_that_was_cut_goes_on(finished, tmp_path, monkeypatch, lost):
-    record, calls = _Driver._record, []
+    record, calls = Driver._record, []
 
     def cut(self):
         calls.append(1)
@@ -115,7 +117,7 @@ def test_a_validation_that_was_cut_goes_on(finished, tmp_path, monkeypatch, lost
         return record(self)
 
     with monkeypatch.context() as patch:
-        patch.setattr("alsph.run._Driver._record", cut)
+        patch.setattr("alsph.running.driver.Driver._record", cut)
         with pytest.raises(KeyboardInterrupt):
             validate(suite=FAST, output=tmp_path, threads=1, progress=False)
     (folder,) = tmp_path.iterdir()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from alsph.window import averaging_window, drift_of, with_trends
+from alsph.analysis.window import averaging_window, drift_of, with_trends
 
 TIME = np.arange(0, 82, 0.01)
 

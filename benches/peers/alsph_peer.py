@@ -6,9 +6,9 @@ import time
 
 import alsph
 import numpy as np
+from alsph.analysis.sampling import interpolate
 from alsph.cases.cavity import CENTRE_LINES, on_centre_lines
-from alsph.geometry import Kind
-from alsph.sampling import interpolate
+from alsph.geometry.particles import Kind
 from scipy.spatial import cKDTree
 
 

@@ -7,8 +7,8 @@ import json
 import time
 
 import numpy as np
+from alsph.analysis.sampling import interpolate
 from alsph.cases.cavity import CENTRE_LINES, on_centre_lines
-from alsph.sampling import interpolate
 from pysph.examples import cavity, flow_past_cylinder_2d, taylor_green
 from pysph.solver.utils import iter_output
 from scipy.spatial import cKDTree

@@ -14,8 +14,8 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
+from alsph.analysis.sampling import interpolate
 from alsph.cases.cavity import CENTRE_LINES, on_centre_lines
-from alsph.sampling import interpolate
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 

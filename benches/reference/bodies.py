@@ -23,8 +23,8 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 import shapely
+from alsph.arrays import FloatArray
 from alsph.cases import Body
-from alsph.geometry import FloatArray
 from finite_elements import Flow
 from netgen.meshing import MeshingParameters
 

@@ -103,9 +103,9 @@ def solve(until: float, resolutions: list[int], output: Path, step: float = 0.00
 
 def compare(path: Path, resolution: int, until: float, settings: dict[str, object]) -> None:
     """Print forces and velocity errors of alsph against the fields in `path`."""
+    from alsph.analysis.sampling import interpolate
     from alsph.cases import Cylinder
-    from alsph.geometry import Kind
-    from alsph.sampling import interpolate
+    from alsph.geometry.particles import Kind
 
     fields = np.load(path)
     start = fields[f"start_{resolution}"].reshape(round(LENGTH * resolution), round(HEIGHT * resolution), 3)
@@ -156,7 +156,7 @@ def compare(path: Path, resolution: int, until: float, settings: dict[str, objec
 
 def errors_beside(state: dict[str, np.ndarray], net: np.ndarray, resolution: int) -> np.ndarray:
     """Heights [Δx] of the particles at the cylinder's sides, and errors of u along and off the surface and of C_p."""
-    from alsph.geometry import Kind
+    from alsph.geometry.particles import Kind
 
     offset = state["position"] - (UPSTREAM, 0)
     radius, angle = np.hypot(*offset.T), np.arctan2(offset[:, 1], -offset[:, 0])

@@ -16,13 +16,13 @@ except ImportError as error:
     ) from error
 
 from alsph import cases, errors, study
-from alsph.autotune import autotune
-from alsph.convergence import converge
-from alsph.repetition import repeat
-from alsph.results import Run
-from alsph.run import resume
-from alsph.simulation import Simulation
-from alsph.validation import validate
+from alsph.engine.simulation import Simulation
+from alsph.results.run import Run
+from alsph.running.repetition import repeat
+from alsph.running.start import resume
+from alsph.study.autotune import autotune
+from alsph.study.convergence import converge
+from alsph.study.validation import validate
 
 open_run = Run
 """Open a run folder: ``alsph.open_run("runs/re200")``."""

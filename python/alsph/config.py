@@ -13,7 +13,7 @@ import tomli_w
 from pydantic import Field
 
 from alsph import cases
-from alsph.errors import ConfigError
+from alsph.errors import ConfigError, RunFolderError
 from alsph.parameters import Parameters
 from alsph.text import contents, shown
 
@@ -51,6 +51,11 @@ class Config:
 
     case: cases.Case
     run: RunSettings = RunSettings()
+
+    @property
+    def name(self) -> str:
+        """Name of the case."""
+        return self.case.name
 
     @property
     def until(self) -> float:
@@ -165,6 +170,27 @@ def load(path: str | Path, *folders: Path) -> Config:
         If it cannot be read or used; the message starts with the file's name.
     """
     return read(path, lambda tables: from_tables(tables, *(folders or (Path(path).parent,))))
+
+
+def of_run(folder: Path) -> Config:
+    """Return the resolved configuration of a run folder.
+
+    Raises
+    ------
+    RunFolderError
+        If it has none, or one that cannot be used.
+    """
+    if not (folder / "case.toml").is_file():
+        raise RunFolderError(f"{folder}: not a run folder that alsph can use, it has no case.toml")
+    try:
+        return load(folder / "case.toml", folder, Path())
+    except ConfigError as error:
+        remedy = (
+            "it is of an older alsph and does not hold the outline: put the file into it, or go to where it was run"
+            if "shape = '" in str(error)
+            else "the folder is damaged or was made by another version"
+        )
+        raise RunFolderError(f"{error}; {remedy}") from None
 
 
 def read(path: str | Path, make: Callable[[dict[str, Any]], Made]) -> Made:

@@ -1,4 +1,4 @@
-"""Texts of others, such as names, paths and what files hold: read with bounds, and shown without harm."""
+"""Texts of others, such as names, paths and what files hold: read with bounds, and shown without harm; durations."""
 
 import errno
 import os
@@ -60,3 +60,10 @@ def shown(value: Any, longest: int = LONGEST_VALUE) -> str:
     except (ValueError, RecursionError):  # numbers of thousands of digits, tables nested without end
         return f"a {type(value).__name__} too long to be shown"
     return text if len(text) <= longest else f"{text[: longest - 4]} ..."
+
+
+def duration(seconds: float) -> str:
+    """Return a length of time in words."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from alsph import reference, sampling
+from alsph import reference
+from alsph.analysis import sampling
+from alsph.analysis.measures import Measure
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
 from alsph.cases.base import Case
-from alsph.geometry import FloatArray, Kind, cell_centres, cells, inside, join, lattice, particles, walls
-from alsph.measures import Measure
-
-if TYPE_CHECKING:
-    from alsph.results import Run
+from alsph.geometry.lattice import cell_centres, cells, inside, lattice
+from alsph.geometry.particles import Kind, join, particles
+from alsph.geometry.solids import walls
 
 
 class BackwardFacingStep(Case):
@@ -117,7 +119,7 @@ class BackwardFacingStep(Case):
         share = (y - floor) / height
         return np.stack([6 * self.inlet_height / height * share * (1 - share), 0 * y], axis=1)
 
-    def measures(self, run: Run) -> list[Measure]:
+    def measures(self, run: Record) -> list[Measure]:
         """Return the distance from the step at which the flow reattaches, averaged over the last quarter of the run."""
         row = reference.row("step_reattachment.csv", self.reynolds, "Re_D_Umean_2h_over_nu")
         known = row if (self.expansion, self.upstream) == (2.0, 5.0) else None
@@ -125,7 +127,7 @@ class BackwardFacingStep(Case):
         source = "independent finite-element solution (alsph/reference)" if known else ""
         return [Measure("reattachment length, D", self.reattachment(run), length, 0.03, source)]
 
-    def reattachment(self, run: Run) -> float:
+    def reattachment(self, run: Record) -> float:
         """Return where the shear stress on the floor becomes positive for good [D]; NaN where it does not.
 
         The stress is that of the parabola through zero at the wall and the velocities Δx/2 and 3Δx/2 above it.

@@ -12,17 +12,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
-from alsph import remarks
+from alsph.analysis.measures import Measure, Profile
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
+from alsph.cases import remarks
 from alsph.cases.method import Method
+from alsph.engine.problem import Problem
+from alsph.engine.simulation import Simulation, bytes_per_particle, time_step_limits
 from alsph.errors import ConfigError
-from alsph.geometry import FloatArray, Kind, Problem
-from alsph.measures import Measure, Profile
+from alsph.geometry.particles import Kind
+from alsph.geometry.surface import Surface
 from alsph.memory import check
 
 if TYPE_CHECKING:
-    from alsph.results import Run
-    from alsph.simulation import Simulation
-    from alsph.surface import Surface
+    from alsph.results.run import Run
 
 VELOCITY_LIMIT = 50.0
 """Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
@@ -186,11 +189,11 @@ class Case(Method):
             *remarks.penalty(self.expected_penalty_constant()),
         ]
 
-    def measures(self, run: Run) -> list[Measure]:
+    def measures(self, run: Record) -> list[Measure]:
         """Return what a run of this case is judged by."""
         return []
 
-    def profiles(self, run: Run) -> list[Profile]:
+    def profiles(self, run: Record) -> list[Profile]:
         """Return the curves of a run of this case that have a reference."""
         return []
 
@@ -251,8 +254,8 @@ class Case(Method):
         threads
             Number of threads; all cores if None.
         initial_run
-            Run folder whose last flow this one starts with (:func:`alsph.beginning.started`); the case's own start if
-            None. The inflow stays that of the case.
+            Run folder whose last flow this one starts with (:func:`alsph.running.beginning.started`); the case's own
+            start if None. The inflow stays that of the case.
 
         Warns
         -----
@@ -264,12 +267,11 @@ class Case(Method):
         ConfigError, RunFolderError
             If the case does not fit into memory, or the flow of `initial_run` cannot be used.
         """
-        from alsph import beginning
-        from alsph.results import Run
-
         problem = self.build(threads if isinstance(threads, int) else None)
         if initial_run is not None:
-            problem = self.problem(beginning.started(self, problem.state, Run(initial_run)))
+            from alsph.running import beginning
+
+            problem = self.problem(beginning.started(self, problem.state, initial_run))
         if warning := self.time_step_warning():
             warnings.warn(warning, stacklevel=2)
         return self._simulation(problem, threads)
@@ -289,8 +291,6 @@ class Case(Method):
         return simulation
 
     def _simulation(self, problem: Problem, threads: int | None) -> Simulation:
-        from alsph.simulation import Simulation
-
         simulation = Simulation(problem, threads, until=self.default_until)
         if self.has_inflow:
             simulation.set_inflow(self.inflow)
@@ -340,16 +340,14 @@ class Case(Method):
         Interrupted
             At Ctrl-C or SIGTERM, a ``KeyboardInterrupt``, after a checkpoint has been written.
         """
-        from alsph.config import Config, RunSettings
-        from alsph.run import Control, start
+        from alsph.running.control import Control
+        from alsph.running.start import run
 
-        config = Config(self, RunSettings(until=until, threads=threads, **settings))
-        return start(config, Path(folder), Control(progress, walltime=walltime, retry=retry), force=force)
+        control = Control(progress, walltime=walltime, retry=retry)
+        return run(self, Path(folder), control, force=force, until=until, threads=threads, **settings)
 
     def memory(self) -> float:
         """Return the estimated peak memory of a simulation [bytes]."""
-        from alsph.simulation import bytes_per_particle
-
         return bytes_per_particle(self.settings()) * self.particle_estimate()
 
     def time_step_limits(self) -> dict[str, float]:
@@ -357,8 +355,6 @@ class Case(Method):
 
         ``courant`` is the one asked for, ``penalty``, ``viscous`` and ``body_force`` are limits of stability.
         """
-        from alsph.simulation import time_step_limits
-
         limits = time_step_limits(self.settings(), self.velocity_max)
         return {name: limits[name] / self.particle_spacing for name in ("courant", "penalty", "viscous", "body_force")}
 
@@ -372,8 +368,6 @@ class Case(Method):
 
     def expected_penalty_constant(self) -> float:
         """Return C_BV = (c/u_max)² at the expected largest velocity, c the penalty's speed of sound."""
-        from alsph.simulation import time_step_limits
-
         if self.penalty_constant is not None:
             return self.penalty_constant
         largest = time_step_limits(self.settings(), self.velocity_max)["lambda_max"]

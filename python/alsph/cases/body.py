@@ -5,26 +5,25 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import shapely
 from pydantic import Field, field_validator, model_validator
 from shapely import affinity
 
-from alsph import remarks
+from alsph.analysis.measures import Measure
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
+from alsph.cases import remarks
 from alsph.cases.channel import Channel
+from alsph.cases.remarks import TOO_THIN
 from alsph.errors import ConfigError
-from alsph.geometry import FloatArray, Solid
-from alsph.measures import Measure
-from alsph.outline import Outline
-from alsph.packing import pack
-from alsph.remarks import TOO_THIN
-from alsph.surface import Surface, along, edges
-from alsph.thin import carried, solid
-
-if TYPE_CHECKING:
-    from alsph.results import Run
+from alsph.geometry.outline import Outline
+from alsph.geometry.packing import pack
+from alsph.geometry.solids import Solid
+from alsph.geometry.surface import Surface, along, edges
+from alsph.geometry.thin import carried, solid
 
 
 class Body(Channel):
@@ -155,7 +154,7 @@ class Body(Channel):
         ]
         return [*super().remarks(), *thin, unknown]
 
-    def measures(self, run: Run) -> list[Measure]:
+    def measures(self, run: Record) -> list[Measure]:
         """Return the forces, among them what a body at an angle has: mean lift and moment; and the Strouhal number."""
         return [
             *super().measures(run),

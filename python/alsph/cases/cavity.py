@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from pydantic import Field
 
-from alsph import reference, remarks, sampling
+from alsph import reference
+from alsph.analysis import sampling
+from alsph.analysis.measures import Measure, Profile
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
+from alsph.cases import remarks
 from alsph.cases.base import Case
-from alsph.geometry import FloatArray, Kind, cells, join, particles, walls
-from alsph.measures import Measure, Profile
-
-if TYPE_CHECKING:
-    from alsph.results import Run
+from alsph.geometry.lattice import cells
+from alsph.geometry.particles import Kind, join, particles
+from alsph.geometry.solids import walls
 
 BOX = shapely.box(0, 0, 1, 1)
 LINE = np.linspace(0, 1, 401)[1:-1]
@@ -90,7 +93,7 @@ class Cavity(Case):
             solid.where(lid).particles([1.0, 0.0], body=1),
         )
 
-    def measures(self, run: Run) -> list[Measure]:
+    def measures(self, run: Record) -> list[Measure]:
         """Return the extrema of the velocities on the centre lines, averaged over the last quarter of the run."""
         known = reference.row("cavity_extrema.csv", self.reynolds) or {}
         u, v = self._centre_lines(run)
@@ -105,7 +108,7 @@ class Cavity(Case):
             for column, (name, value) in extrema.items()
         ]
 
-    def profiles(self, run: Run) -> list[Profile]:
+    def profiles(self, run: Record) -> list[Profile]:
         """Return u(y) at x = D/2 and v(x) at y = D/2, averaged over the last quarter of the run."""
         name = f"cavity_Re{self.reynolds:g}_profile101.csv"
         known = (reference.FOLDER / name).exists()
@@ -118,6 +121,6 @@ class Cavity(Case):
         ]
 
     @staticmethod
-    def _centre_lines(run: Run) -> tuple[FloatArray, FloatArray]:
+    def _centre_lines(run: Record) -> tuple[FloatArray, FloatArray]:
         """Return u at x = D/2 and v at y = D/2 along `LINE`."""
         return on_centre_lines(sampling.late_velocity(run, CENTRE_LINES))

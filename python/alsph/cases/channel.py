@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
-from alsph import remarks
+from alsph.analysis.measures import Measure
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
+from alsph.cases import remarks
 from alsph.cases.base import Case
-from alsph.geometry import FloatArray, Kind, Solid, cell_centres, join, lattice, particles, symmetric_centres
-from alsph.measures import Measure
+from alsph.geometry.lattice import cell_centres, lattice, symmetric_centres
+from alsph.geometry.particles import Kind, join, particles
+from alsph.geometry.solids import Solid
 from alsph.reference import Reference
-
-if TYPE_CHECKING:
-    from alsph.results import Run
 
 
 class Channel(Case):
@@ -140,7 +141,7 @@ class Channel(Case):
             *(solid.moved(self.centre).particles(body=index) for index, solid in enumerate(self.solids())),
         )
 
-    def measures(self, run: Run) -> list[Measure]:
+    def measures(self, run: Record) -> list[Measure]:
         """Return the forces on the body and the Strouhal number."""
         known = self._reference() or Reference({}, "")
         computed = {

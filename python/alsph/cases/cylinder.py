@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from alsph import reference
+from alsph.analysis.measures import Measure, Profile
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
 from alsph.cases.channel import Channel
-from alsph.geometry import FloatArray, Solid, cylinder_rings
-from alsph.measures import Measure, Profile
+from alsph.geometry.solids import Solid, cylinder_rings
+from alsph.geometry.surface import Surface, circle
 from alsph.reference import Reference
-from alsph.surface import Surface, circle
-
-if TYPE_CHECKING:
-    from alsph.results import Run
 
 RADIUS = 0.5
 FAR = {"height": 60.0, "upstream": 15.0}
@@ -61,7 +60,7 @@ class Cylinder(Channel):
         """Return the area of the channel without the cylinder."""
         return self.length * self.height - math.pi * RADIUS**2
 
-    def measures(self, run: Run) -> list[Measure]:
+    def measures(self, run: Record) -> list[Measure]:
         """Return forces and Strouhal number, and the error of the pressure coefficient where its curve is known."""
         measures = super().measures(run)
         for profile in self.profiles(run):
@@ -71,7 +70,7 @@ class Cylinder(Channel):
             measures.append(Measure(name, float(error), 0.0, 0.05, profile.source))
         return measures
 
-    def profiles(self, run: Run) -> list[Profile]:
+    def profiles(self, run: Record) -> list[Profile]:
         """Return the mean pressure coefficient over the angle, the mean of both sides, where its curve is known."""
         known, found = self._reference(), run.pressure_coefficient
         if known is None or known.pressure_coefficient is None or not found.theta.size:

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from alsph.analysis import error_norms
+from alsph.analysis.averages import error_norms
+from alsph.analysis.measures import Measure, Profile
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
 from alsph.cases.base import Case
-from alsph.geometry import FloatArray, Kind, cells, join, particles, walls
-from alsph.measures import Measure, Profile
-
-if TYPE_CHECKING:
-    from alsph.results import Run
+from alsph.geometry.lattice import cells
+from alsph.geometry.particles import Kind, join, particles
+from alsph.geometry.solids import walls
 
 TERMS = np.arange(1, 401)[:, None]
 """Indices of the terms of the series (400, 1); those that are left out have decayed after t* = 1e-4 Re."""
@@ -88,7 +89,7 @@ class Plates(Case):
             solid.where(period & (y > 1)).particles([self.upper_velocity, 0.0], body=1),
         )
 
-    def measures(self, run: Run) -> list[Measure]:
+    def measures(self, run: Record) -> list[Measure]:
         """Return the relative error (L2 over the particles) of the velocity in the last snapshot."""
         error = np.nan
         if (run.times > 0).any():
@@ -98,7 +99,7 @@ class Plates(Case):
             error = error_norms(snapshot.velocity[fluid], exact)["l2"]
         return [Measure("relative L2 error of the velocity", error, 0.0, 0.01, self.source)]
 
-    def profiles(self, run: Run) -> list[Profile]:
+    def profiles(self, run: Record) -> list[Profile]:
         """Return the particles' velocities in the last snapshot over their heights."""
         if not len(run.times):
             return []

@@ -4,8 +4,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from alsph.arrays import FloatArray
 from alsph.cases.plates import TERMS, Plates
-from alsph.geometry import FloatArray
 
 
 class Poiseuille(Plates):

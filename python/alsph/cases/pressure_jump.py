@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from alsph.analysis.measures import Measure
+from alsph.analysis.record import Record
 from alsph.cases.base import Case
-from alsph.geometry import Kind, cell_centres, lattice, particles
-from alsph.measures import Measure
-
-if TYPE_CHECKING:
-    from alsph.results import Run
+from alsph.geometry.lattice import cell_centres, lattice
+from alsph.geometry.particles import Kind, particles
 
 
 class PressureJump(Case):
@@ -50,7 +49,7 @@ class PressureJump(Case):
         position = lattice(*[cell_centres(self.resolution, self.particle_spacing)] * 2)
         return particles(Kind.FLUID, position, [0.0, 1.0], pressure=position[:, 0] < 0.5)
 
-    def measures(self, run: Run) -> list[Measure]:
+    def measures(self, run: Record) -> list[Measure]:
         """Return the jump that is left in the last snapshot, and the kinetic energy of the motion against the stream.
 
         The energy's unit is (Δp/2)²/(2ρU²) D², of which a fluid with a speed of sound U would make motion.

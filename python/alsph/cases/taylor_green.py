@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from alsph import analysis, reference
+from alsph import reference
+from alsph.analysis import averages
+from alsph.analysis.measures import Measure, Profile
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
 from alsph.cases.base import Case
 from alsph.errors import ConfigError
-from alsph.geometry import FloatArray, Kind, cell_centres, lattice, particles
-from alsph.measures import Measure, Profile
-
-if TYPE_CHECKING:
-    from alsph.results import Run
+from alsph.geometry.lattice import cell_centres, lattice
+from alsph.geometry.particles import Kind, particles
 
 EARLY = 0.05
 """Time [D/U] up to which the transfer to smaller vortices adds less than 0.5 % to the decay rate in 3-D."""
@@ -101,7 +102,7 @@ class TaylorGreen(Case):
         velocity = np.stack([np.sin(x) * np.cos(y), -np.cos(x) * np.sin(y), 0 * z], axis=1) * np.cos(z)[:, None]
         return {"velocity": velocity, "pressure": (np.cos(2 * x) + np.cos(2 * y)) * (np.cos(2 * z) + 2) / 16}
 
-    def measures(self, run: Run) -> list[Measure]:
+    def measures(self, run: Record) -> list[Measure]:
         """Return the decay rate of the kinetic energy and, where the solution is known, the error of the field.
 
         In 2-D the rate is 4νk² at all times, with k = 2π/D. In 3-D it is 6νk² at first, since the initial velocity is
@@ -111,13 +112,13 @@ class TaylorGreen(Case):
         """
         time, energy = run.history["time"], run.history.get("kinetic_energy", np.empty(0))
         if self.dimensions == 2:
-            rate = analysis.decay_rate(time, energy)
+            rate = averages.decay_rate(time, energy)
             return [
                 Measure("decay rate of the kinetic energy, U/D", rate, self._decay_rate, 0.01, "exact solution"),
                 Measure("error of the velocity at the last output, L1", self._error(run), 0.0, 0.01, "exact solution"),
             ]
         early = time <= EARLY
-        rate = analysis.decay_rate(np.r_[0.0, time[early]], np.r_[0.125, energy[early]])
+        rate = averages.decay_rate(np.r_[0.0, time[early]], np.r_[0.125, energy[early]])
         name = "initial decay rate of the kinetic energy, U/D"
         measures = [Measure(name, rate, self._decay_rate, 0.03, "exact initial rate")]
         for profile in self.profiles(run) if time.size else ():
@@ -129,7 +130,7 @@ class TaylorGreen(Case):
             measures.append(Measure(name, float(error), 0.0, 0.02, profile.source))
         return measures
 
-    def profiles(self, run: Run) -> list[Profile]:
+    def profiles(self, run: Record) -> list[Profile]:
         """Return the kinetic energy over time, where it is known."""
         time = run.history["time"]
         if self.dimensions == 2:
@@ -150,9 +151,9 @@ class TaylorGreen(Case):
         """Exact decay rate of the kinetic energy [U/D]: at all times in 2-D, at first in 3-D."""
         return float(2 * self.dimensions * (2 * np.pi) ** 2 / self.reynolds)
 
-    def _error(self, run: Run) -> float:
+    def _error(self, run: Record) -> float:
         """Mean modulus of the error of the velocity over that of the velocity, at the last output."""
         if not run.times.size:
             return float("nan")
         last = run.snapshot()
-        return analysis.error_norms(last.velocity, self.exact(last.position, last.time)["velocity"])["l1"]
+        return averages.error_norms(last.velocity, self.exact(last.position, last.time)["velocity"])["l1"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alsph.geometry import FloatArray
+from alsph.arrays import FloatArray
 
 FOLDER = Path(__file__).parent
 COLUMNS = {

@@ -12,10 +12,9 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from alsph.progress import duration
 from alsph.study.declaration import Point, Study
 from alsph.study.state import ENDED, State
-from alsph.text import printable
+from alsph.text import duration, printable
 
 PLAIN_SECONDS = 60.0
 

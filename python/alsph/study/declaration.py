@@ -12,13 +12,14 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from alsph import beginning, config
+from alsph import config
 from alsph.config import Config
+from alsph.engine.inflow import fingerprint
 from alsph.errors import ConfigError
-from alsph.inflow import fingerprint
 from alsph.parameters import Parameters, suggest
-from alsph.plotting import field_style
-from alsph.results import Run
+from alsph.plotting.pictures import field_style
+from alsph.results.run import Run
+from alsph.running import beginning
 
 UNHASHED = ("threads", "checkpoint_minutes", "flush_seconds")
 """Settings of a run that change nothing in its results."""

@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alsph import plotting
-from alsph.analysis import Estimate, remark
+from alsph.analysis.averages import Estimate, remark
+from alsph.analysis.measures import Profile
+from alsph.analysis.window import DEVELOPING
+from alsph.cases.remarks import keywords, tally
 from alsph.config import Config
-from alsph.durable import check_target, replacing, write_text
 from alsph.errors import AlsphError, ConfigError
-from alsph.io import RunFolder
-from alsph.measures import Profile
+from alsph.folder.durable import check_target, replacing, write_text
+from alsph.folder.run_folder import RunFolder
 from alsph.parameters import suggest
-from alsph.plotting import Curve
-from alsph.remarks import keywords, tally
-from alsph.results import Run
+from alsph.plotting.curves import Curve
+from alsph.results.run import Run
 from alsph.study.declaration import Figure, Point, Study, text
 from alsph.study.state import ENDED, RUNS, State, states
 from alsph.tables import markdown
 from alsph.text import in_figure, printable
-from alsph.window import DEVELOPING
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Picture
@@ -93,8 +93,8 @@ class Results:
         Folder of the tables and figures.
     rows : list of dict
         For each run its swept parameters, ``status``, ``time`` reached, ``folder``, and the results by name, numbers
-        with their uncertainty where they have one (:class:`alsph.analysis.Estimate`); ``remarks`` are what there is to
-        be said of a run, its :attr:`alsph.Run.remarks` in short.
+        with their uncertainty where they have one (:class:`alsph.analysis.averages.Estimate`); ``remarks`` are what
+        there is to be said of a run, its :attr:`alsph.Run.remarks` in short.
     references : list of dict
         Reference values of the same results, where they are known.
     states : list of State

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from alsph.errors import RunFolderError
-from alsph.io import UNFINISHED, RunFolder
+from alsph.folder.run_folder import UNFINISHED, RunFolder
 from alsph.study.declaration import Point
 from alsph.text import printable
 

@@ -14,7 +14,8 @@ from typing import Any
 
 from alsph import config
 from alsph.errors import AlsphError, RunFolderError, SolverError
-from alsph.run import Control, complete
+from alsph.running.control import Control
+from alsph.running.start import complete
 
 POLL_SECONDS = 0.5
 

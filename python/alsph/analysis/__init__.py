@@ -1,0 +1,1 @@
+"""Measures of arrays: averages, spectra, windows, uncertainties, fields at points."""

@@ -1,0 +1,90 @@
+"""Loads, divergence and surface pressure of a run, averaged over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alsph.analysis.averages import Estimate
+from alsph.arrays import FloatArray
+from alsph.geometry.surface import Surface
+
+
+@dataclass(frozen=True)
+class Load:
+    """A coefficient of a force, F / (½ρU²D), or moment, M / (½ρU²c²), over the averaging window.
+
+    Attributes
+    ----------
+    mean, rms, amplitude : Estimate
+        Time average (21), root mean square about zero (23), and amplitude of the fundamental.
+    pressure, viscous : Estimate
+        Time averages of the two parts.
+    """
+
+    mean: Estimate
+    rms: Estimate
+    amplitude: Estimate
+    pressure: Estimate
+    viscous: Estimate
+
+
+@dataclass(frozen=True)
+class Divergence:
+    """|∇·u| of the fluid particles in U/D over the averaging window.
+
+    Attributes
+    ----------
+    mean, sum, max : Estimate
+        Time averages of the mean, the sum and the maximum over the particles. The paper's "mean velocity divergence" is
+        ``sum`` times the length of its averaging period.
+    """
+
+    mean: Estimate
+    sum: Estimate
+    max: Estimate
+
+
+@dataclass(frozen=True, eq=False)
+class PressureCoefficient:
+    """Pressure coefficient on the surface over the averaging window, relative to the mean inlet pressure.
+
+    Attributes
+    ----------
+    theta : ndarray, shape (m,)
+        Degrees from the front stagnation point.
+    mean, deviation : ndarray, shape (m,)
+        Time average (22) and standard deviation in time; NaN where there are too few samples.
+    samples : int
+        Number of samples in the window.
+    developing : bool
+        Whether the flow still develops in the window.
+    surface : Surface, optional
+        Where the samples were taken: x/c, side, arc length, normal and length of each piece of the surface, shape (m,).
+    """
+
+    theta: FloatArray
+    mean: FloatArray
+    deviation: FloatArray
+    samples: int
+    developing: bool = False
+    surface: Surface | None = None
+
+    def force(self, part: int | None = None) -> FloatArray:
+        """Pressure parts of the mean drag and lift coefficient, −∮ C_p n ds: a check of the recorded ones.
+
+        Parameters
+        ----------
+        part : int, optional
+            Number of the closed curve; all of them if None.
+
+        Returns
+        -------
+        ndarray, shape (2,)
+            NaN where there are no samples, or an older version has not written where they were taken.
+        """
+        if self.surface is None:
+            return np.full(2, np.nan)
+        chosen = self.mean if part is None else np.where(self.surface.part == part, self.mean, 0.0)
+        return -self.surface.integral(chosen)

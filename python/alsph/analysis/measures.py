@@ -1,0 +1,70 @@
+"""What a run is judged by: numbers and profiles beside their reference values."""
+
+import math
+import re
+from dataclasses import dataclass
+
+from alsph.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number of a run and what it should be.
+
+    Attributes
+    ----------
+    name : str
+        What it is, with its unit, as in :meth:`alsph.Run.summary`.
+    value : float
+        As computed; NaN where the run does not tell.
+    reference : float
+        As it should be; zero for an error norm, NaN where that is not known.
+    tolerance : float
+        Largest error that passes.
+    source : str
+        Where the reference comes from.
+    """
+
+    name: str
+    value: float
+    reference: float = math.nan
+    tolerance: float = math.nan
+    source: str = ""
+
+    @property
+    def error(self) -> float:
+        """Deviation from the reference over its modulus; the value itself where the reference is zero."""
+        return (self.value - self.reference) / (abs(self.reference) or 1.0)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the error is within the tolerance; a NaN is not."""
+        return abs(self.error) <= self.tolerance
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A computed curve and the reference curve to draw beside it, if there is one.
+
+    Attributes
+    ----------
+    name : str
+        What is drawn; the figure's title.
+    axes : (str, str)
+        Labels of abscissa and ordinate, with units.
+    computed, reference : (x, y)
+        Arrays (m,) and (n,) of each; n = 0 where the reference is not known.
+    source : str
+        Where the reference comes from.
+    """
+
+    name: str
+    axes: tuple[str, str]
+    computed: tuple[FloatArray, FloatArray]
+    reference: tuple[FloatArray, FloatArray]
+    source: str
+
+    @property
+    def file_name(self) -> str:
+        """Name of the file, without suffix, that its figure is saved in."""
+        return "_".join(re.findall(r"\w+", self.name.lower()))

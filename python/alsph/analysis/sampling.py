@@ -1,0 +1,193 @@
+"""Particle fields at points, and the momentum balance of a box around a body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
+from alsph.errors import ConfigError
+from alsph.geometry.particles import Kind, neighbour_tree
+
+NEIGHBOURS_PER_DIMENSION = 8
+SINGULAR = 1e-5  # directions that the neighbours determine less well than this are left out of a fit
+CHUNK = 50_000  # points that fields are interpolated to at a time
+VOID = 1.5  # points further than this many Δx from every particle have no value
+
+
+def _nearest(position: FloatArray, points: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Distances (m, k) from each point to its nearest particles, nearest first, and their indices (m, k)."""
+    count = min(NEIGHBOURS_PER_DIMENSION * points.shape[1], len(position))
+    distance, index = neighbour_tree(position).query(points, k=[*range(1, count + 1)])
+    return distance, index
+
+
+def average(position: FloatArray, values: FloatArray, points: FloatArray, spacing: float) -> FloatArray:
+    """Gaussian means (m,) of a particle field `values` (n,) at points (m, d): smooth, for pictures.
+
+    NaN where the nearest particle is further away than 1.5 Δx.
+    """
+    distance, index = _nearest(position, points)
+    weight = np.exp(-2 * (distance / spacing) ** 2)
+    means = (weight * values[index]).sum(axis=1) / weight.sum(axis=1)
+    return np.where(distance[:, 0] < VOID * spacing, means, np.nan)
+
+
+def fill(position: FloatArray, points: FloatArray, spacing: float) -> FloatArray:
+    """Share (m,) of the space at points (m, d) that particles fill: 1 inside a body, 1/2 on its surface, 0 far off."""
+    distance, _ = _nearest(position, points)
+    width = 0.7 * spacing
+    kernel = np.exp(-0.5 * (distance / width) ** 2) / (np.sqrt(2 * np.pi) * width) ** points.shape[1]
+    return np.asarray(spacing ** points.shape[1] * kernel.sum(axis=1))
+
+
+def interpolate(
+    position: FloatArray, values: FloatArray, points: FloatArray, spacing: float
+) -> tuple[FloatArray, FloatArray]:
+    """Values and gradients of particle fields at points, by quadratic moving least squares over the nearest particles.
+
+    Exact for quadratic fields.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n, d)
+    values : ndarray, shape (n, k)
+        The k fields at the particles.
+    points : ndarray, shape (m, d)
+    spacing : float
+        Particle spacing Δx; the Gaussian weight has the standard deviation Δx.
+
+    Returns
+    -------
+    values : ndarray, shape (m, k)
+    gradients : ndarray, shape (m, k, d)
+        Derivative of field k along direction d.
+    """
+    distance, index = _nearest(position, points)
+    weight = np.exp(-0.5 * (distance / spacing) ** 2)[..., None]
+    offset = (position[index] - points[:, None]) / spacing
+    first, second = np.triu_indices(points.shape[1])
+    basis = np.concatenate([np.ones_like(weight), offset, offset[..., first] * offset[..., second]], axis=-1)
+    moments = np.swapaxes(basis, 1, 2) @ (weight * basis)
+    coefficients = np.linalg.pinv(moments, SINGULAR, hermitian=True) @ (
+        np.swapaxes(basis, 1, 2) @ (weight * values[index])
+    )
+    return coefficients[:, 0], np.swapaxes(coefficients[:, 1 : points.shape[1] + 1], 1, 2) / spacing
+
+
+def late_velocity(run: Record, points: FloatArray, share: float = 0.25) -> FloatArray:
+    """Fluid velocities (m, d) at points, averaged over the snapshots in the last `share` of the run; NaN without any.
+
+    Parameters
+    ----------
+    run : Record
+    points : ndarray, shape (m, d)
+        Points in the fluid [D].
+    share : float
+        Share of the time reached.
+    """
+    total, late = np.zeros_like(points), run.times[run.times >= (1 - share) * run.times[-1:]]
+    for snapshot in map(run.snapshot, late):
+        position, velocity = snapshot.position[snapshot.fluid], snapshot.velocity[snapshot.fluid]
+        total += interpolate(position, velocity, points, run.spacing)[0]
+    return total / len(late) if len(late) else np.full_like(points, np.nan)
+
+
+def initial_state(state: dict[str, Any], run: Record, *, outlet: bool = True) -> dict[str, Any]:
+    """Particles with the velocity and pressure of the last snapshot of another run.
+
+    Solids keep what they have, the inlet's particles their velocities, which are prescribed, and the outlet's their
+    pressures; so do particles further than 1.5 Δx of that run from all its fluid.
+
+    Parameters
+    ----------
+    state : dict
+        Particles of a case at its start, one array a property.
+    run : Record
+        The other run, at any resolution and of any Reynolds number.
+    outlet : bool
+        Whether the outlet's particles take its velocities, too; where not, they let out what its own inflow brings.
+
+    Raises
+    ------
+    ConfigError
+        If the run is of another number of dimensions.
+    RunFolderError
+        If it has no complete snapshot.
+    """
+    snapshot = run.snapshot()
+    dimensions, own = snapshot.position.shape[1], state["position"].shape[1]
+    if dimensions != own:
+        raise ConfigError(f"initial_run = '{run.path}': it is in {dimensions}-D and this case in {own}-D")
+    source = snapshot.position[snapshot.fluid]
+    fields = np.column_stack([snapshot.velocity, snapshot.pressure])[snapshot.fluid]
+    near = neighbour_tree(source).query(state["position"])[0] < VOID * run.spacing
+    takers = {"velocity": [Kind.FLUID, *[Kind.OUTLET] * outlet], "pressure": [Kind.FLUID, Kind.INLET]}
+    started = state | {name: state[name].copy() for name in takers}
+    chosen = np.flatnonzero(near & (state["kind"] != Kind.SOLID))
+    for some in np.array_split(chosen, 1 + len(chosen) // CHUNK):
+        values, _ = interpolate(source, fields, state["position"][some], run.spacing)
+        for name, columns in (("velocity", values[:, :-1]), ("pressure", values[:, -1])):
+            taking = np.isin(state["kind"][some], takers[name])
+            started[name][some[taking]] = columns[taking]
+    return started
+
+
+def control_volume(
+    position: FloatArray,
+    velocity: FloatArray,
+    pressure: FloatArray,
+    box: tuple[FloatArray, FloatArray],
+    spacing: float,
+    density: float,
+    viscosity: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Surface force on the fluid in a box and its momentum, whose balance gives the force on the body inside.
+
+    The force on the body is ``surface - d(momentum)/dt``: what comes in through the faces less what stays in the fluid.
+
+    Parameters
+    ----------
+    position, velocity : ndarray, shape (n, d)
+        Fluid particles.
+    pressure : ndarray, shape (n,)
+    box : (lower, upper), two ndarrays of shape (d,)
+        Corners; the faces must lie in the fluid.
+    spacing, density, viscosity : float
+        Particle spacing Δx, density ρ and kinematic viscosity ν.
+
+    Returns
+    -------
+    surface, momentum : ndarray, shape (d,)
+    """
+    lower, upper = box
+    dimensions = len(lower)
+    fields = np.column_stack([velocity, pressure])
+    surface = np.zeros(dimensions)
+    for axis, sign, points, area in _faces(lower, upper, spacing):
+        value, gradient = interpolate(position, fields, points, spacing)
+        face_velocity, face_pressure = value[:, :dimensions], value[:, dimensions]
+        rate = gradient[:, :dimensions, :]
+        traction = density * viscosity * (rate[:, :, axis] + rate[:, axis, :])
+        traction -= density * face_velocity * face_velocity[:, [axis]]
+        traction[:, axis] -= face_pressure
+        surface += sign * area * traction.sum(axis=0)
+    centre, half = (lower + upper) / 2, (upper - lower) / 2
+    share = np.clip((half - np.abs(position - centre)) / spacing + 0.5, 0, 1).prod(axis=1)
+    return surface, density * spacing**dimensions * (share @ velocity)
+
+
+def _faces(lower: FloatArray, upper: FloatArray, spacing: float) -> Iterator[tuple[int, int, FloatArray, float]]:
+    """Yield the faces of a box: axis and sign of the outward normal, midpoints (m, d) of its tiles, area of a tile."""
+    counts = np.ceil((upper - lower) / spacing).astype(int)
+    steps = (upper - lower) / counts
+    for axis in range(len(lower)):
+        lines = [lo + step * (np.arange(n) + 0.5) for lo, step, n in zip(lower, steps, counts, strict=True)]
+        for sign, plane in ((-1, lower[axis]), (1, upper[axis])):
+            lines[axis] = np.array([plane])
+            grid = np.meshgrid(*lines, indexing="ij")
+            yield axis, sign, np.stack([g.ravel() for g in grid], axis=1), float(steps.prod() / steps[axis])

@@ -1,0 +1,212 @@
+"""What a resolution and a domain can carry, in words.
+
+A remark is a text ``keyword: what it is; what to do about it``. Each limit says where it comes from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+import shapely
+from shapely import MultiPolygon, Polygon
+
+from alsph.geometry.thin import THINNEST, thickness
+
+LAYER = 1.2
+"""Thickness of the boundary layer at the front of a cylinder over √(νD/U): 2.4 √(ν/a) in stagnation-point flow
+(Schlichting and Gersten, Boundary-Layer Theory, section 5.1) with the strain rate a = 4U/D of potential flow."""
+
+CELL_REYNOLDS = 20.0
+"""Largest UΔx/ν at which results have been compared with those of others (docs/results.md)."""
+
+NARROWEST = {"quintic_spline": 1.2, "wendland_c2": 1.5, "wendland_c4": 1.5}
+"""Smoothing ratio h/Δx below which a kernel has been found to err (docs/experiments.md, Kernels)."""
+
+LARGEST_BLOCKAGE = 0.1
+"""Share of a channel's height; at 0.077 the walls raise a cylinder's drag by 15 % (reference solutions, Re = 100)."""
+
+SLOWED = 0.05
+"""Share by which a cylinder may slow the stream at the inlet, (D/2)²/x² in potential flow."""
+
+OUTLET = 1.5
+"""Distance from the back of a cylinder to the outlet over D: with 1 runs broke down at Re = 100 and 200, with 1.5
+the drag was that with 5.5 (docs/reliability.md)."""
+
+COMPRESSIBLE = 0.46
+"""Largest artificial Mach number of the penalty with which results have been compared (docs/performance.md, Cost and
+error)."""
+
+
+TOO_THIN = "too thin"
+"""What is remarked on a body that the resolution does not carry, and refused."""
+
+THICK = 8.0
+"""Thickness of a body [Δx] from which its recorded loads have met the momentum balance within 3 % (docs/results.md)."""
+
+
+def keywords(remarks: Iterable[str]) -> str:
+    """Return what the remarks are about, each once."""
+    return ", ".join(dict.fromkeys(remark.partition(":")[0] for remark in remarks))
+
+
+def tally(runs: Sequence[str]) -> str:
+    """Return of how many of the runs, each given by its :func:`keywords`, there is what to remark."""
+    words = Counter(word for run in runs for word in run.split(", ") if word)
+    return ", ".join(f"{word}: {count} of {len(runs)} runs" for word, count in words.items())
+
+
+def brief(remarks: Iterable[str]) -> str:
+    """Return the remarks without what explains them, for a line below a picture."""
+    return "  |  ".join(remark.partition(";")[0] for remark in remarks)
+
+
+def boundary_layer(thickness: float, spacing: float) -> list[str]:
+    """Remark on a boundary layer with fewer than two particles in it: they lie Δx/2, 3Δx/2 and so on off the surface.
+
+    Parameters
+    ----------
+    thickness, spacing : float
+        Both in D.
+    """
+    layer = f"boundary layer of {thickness / spacing:.3g} Δx"
+    remedy = f"resolution = {math.ceil(1.5 / thickness - 1e-9)} puts two particles into it"
+    if thickness < 0.5 * spacing:
+        text = f"not resolved: {layer}, below the first particles; forces and separation are not those of this flow"
+        return [f"{text}; {remedy}"]
+    if thickness < 1.5 * spacing:
+        text = f"coarse: {layer}, fewer than two particles; a cylinder's drag and lift err by 5 to 9 % at 0.8 to 1.2 Δx"
+        return [f"{text}, {remedy}"]
+    return []
+
+
+def validated(reynolds: float, resolution: int, cell_reynolds: float, known: tuple[float, float, int]) -> list[str]:
+    """Remark on what lies outside all that has been compared with the results of others.
+
+    Parameters
+    ----------
+    reynolds, resolution, cell_reynolds
+        Re, D/Δx and UΔx/ν.
+    known : (least Re, largest Re, least D/Δx)
+        What has been compared.
+    """
+    least, largest, coarsest = known
+    outside = [f"Re = {reynolds:g}"] if not least <= reynolds <= largest else []
+    outside += [f"D/Δx = {resolution}"] if resolution < coarsest else []
+    outside += [f"UΔx/ν = {cell_reynolds:.3g}"] if cell_reynolds > (1 + 1e-9) * CELL_REYNOLDS else []
+    span = f"Re = {least:g}" + (f" to {largest:g}" if least < largest else "")
+    limit = f"compared with the results of others are {span}, D/Δx from {coarsest}, UΔx/ν up to {CELL_REYNOLDS:g}"
+    return [f"not validated: {', '.join(outside)}; {limit}"] if outside else []
+
+
+def kernel(name: str, smoothing_ratio: float) -> list[str]:
+    """Remark on a kernel whose support is too narrow for the particles in it."""
+    if smoothing_ratio >= NARROWEST[name] - 1e-9:
+        return []
+    found = (
+        "Taylor-Green vortices broke down with h/Δx = 1.1; use smoothing_ratio = 1.2 or more"
+        if name == "quintic_spline"
+        else f"Poiseuille flow then errs by {'3 to 10' if smoothing_ratio < 1.1 else '0.7 to 3'} % at any resolution; "
+        "use smoothing_ratio = 1.75 or more, or the quintic spline"
+    )
+    return [f"kernel: {name} with h/Δx = {smoothing_ratio:.3g}; {found}"]
+
+
+def penalty(constant: float) -> list[str]:
+    """Remark on a penalty constant C_BV too small for a fluid that hardly gives way."""
+    mach = constant**-0.5
+    if mach <= COMPRESSIBLE:
+        return []
+    text = f"the penalty lets the fluid give way as at a Mach number of {mach:.2g}, up to {COMPRESSIBLE:g} was compared"
+    return [f"compressible: {text}; take a smaller courant, or a larger penalty_constant"]
+
+
+def channel(size: float, inlet: float, outlet: float, height: float) -> list[str]:
+    """Remark on a channel that ends, or is closed, too near a body.
+
+    Parameters
+    ----------
+    size : float
+        The body's extent across the stream [D].
+    inlet, outlet : float
+        Distances of the inlet from its centre and of the outlet from its back [D].
+    height : float
+        Height of the channel [D].
+    """
+    remarks = []
+    if outlet < OUTLET * size:
+        text = f"outlet {outlet:.3g} D behind the body; vortices leave as they form, which has made runs break down"
+        remarks.append(f"short channel: {text}, use a larger length")
+    slowed = (0.5 * size / inlet) ** 2
+    if slowed > SLOWED:
+        text = f"inlet {inlet:.3g} D before the body, which slows the stream there by about {100 * slowed:.0f} %"
+        remarks.append(f"short channel: {text}; the inflow is uniform all the same, use a larger upstream")
+    if size / height > LARGEST_BLOCKAGE:
+        text = f"the body blocks {100 * size / height:.0f} % of it; its coefficients are not those of unbounded flow"
+        remarks.append(f"narrow channel: {text}")
+    return remarks
+
+
+def protrusion(shape: Polygon | MultiPolygon, thickness: float) -> float:
+    """Return how far [D] parts of a shape thinner than `thickness` reach beyond its thicker ones; inf if all are."""
+    thicker = shape.buffer(-0.5 * thickness).buffer(0.5 * thickness)
+    if thicker.is_empty:
+        return math.inf
+    return reach(shape, thicker, 0.5 * thickness)
+
+
+def reach(shape: Polygon | MultiPolygon, rest: Polygon | MultiPolygon, step: float) -> float:
+    """Return how far [D] a shape reaches beyond what is left of it, by points of its outline up to `step` apart."""
+    outline = shapely.get_coordinates(shapely.segmentize(shape, step))
+    return float(shapely.distance(rest, shapely.points(outline)).max())
+
+
+def thinnest(shape: Polygon | MultiPolygon) -> float:
+    """Return the thickness [D] of the thinnest part of a shape that reaches out farther than it is thick.
+
+    It is 0 where the shape tapers to an edge of less than 39 degrees; other corners are no thin parts.
+    """
+    left, bottom, right, top = shape.bounds
+    size = max(right - left, top - bottom)
+    thin, thick = 0.0, 2 * size
+    plain = shapely.simplify(shape, 1e-4 * size)
+    while thick - thin > 1e-4 * thick > 1e-9 * size:
+        middle = 0.5 * (thin + thick)
+        if protrusion(plain, middle) > middle:
+            thick = middle
+        else:
+            thin = middle
+    return thin
+
+
+def thin(name: str, shape: Polygon, carried: Polygon | MultiPolygon, spacing: float) -> list[str]:
+    """Remark on what the resolution cuts off a body, and on loads that two near faces make uncertain (lengths in D).
+
+    Parameters
+    ----------
+    name
+        Name of the body.
+    shape, carried
+        The body, and what is carried of it.
+    spacing : float
+        Particle spacing Δx.
+    """
+    thick = thickness(shape)
+    if carried.is_empty:
+        text = f"the {name} is at most {thick:.3g} D or {thick / spacing:.3g} Δx thick, the flow would go through it"
+        return [
+            f"{TOO_THIN}: {text}; it takes {THINNEST:g} Δx, resolution = {math.ceil(THINNEST / thick - 0.05)} or more"
+        ]
+    found = []
+    length, area = reach(shape, carried, 0.5 * spacing), 1 - carried.area / shape.area
+    pieces = len(shapely.get_parts(carried))
+    if length > spacing or pieces > 1:
+        text = f"cut off, for they are thinner than 2 Δx: up to {length:.2g} D of tips, {100 * area:.2g} % of the area"
+        if pieces > 1:
+            text += f", so that the {name} is in {pieces} pieces, with flow between them"
+        found.append(f"thin parts: {text}; they come back with resolution")
+    if thick < 0.99 * THICK * spacing:
+        known = "lift and drag were found off by 20 to 30 % below 3 Δx, by 4 % at 5 Δx"
+        found.append(f"thin body: {thick / spacing:.2g} Δx at its thickest; {known}; use a finer resolution")
+    return found

@@ -1,0 +1,137 @@
+"""The options of a command, from the parameters of a case and the settings of a run."""
+
+import functools
+import inspect
+import types
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import typer
+from typer.core import TyperGroup
+
+from alsph import cases, config
+from alsph.cli.terminal import exit_codes
+from alsph.config import Config, RunSettings
+from alsph.parameters import Parameters, describe_default
+from alsph.text import shown
+
+
+class CaseGroup(TyperGroup):
+    """Commands named after the cases; the name of a TOML file stands for the case in it, with its parameters."""
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return the command of a case, or of the case in a file."""
+        with exit_codes():
+            if cmd_name.endswith(".toml"):
+                ctx.obj = config.load(cmd_name)
+                cmd_name = ctx.obj.case.name
+            return super().get_command(ctx, cases.find(cmd_name).name)
+
+
+StudyName = Annotated[str, typer.Argument(metavar="NAME|FILE.toml", help="study: see alsph study list")]
+
+Preset = Annotated[str | None, typer.Option(help="preset of the study", show_default="its first")]
+
+StudyOutput = Annotated[Path, typer.Option("--output", "-o", help="folder for runs and results")]
+
+Jobs = Annotated[int | None, typer.Option(help="runs at a time", show_default="cores / threads")]
+
+Scheduler = Annotated[
+    str | None, typer.Option(help="address of a Dask scheduler, tcp://HOST:8786", show_default="local processes")
+]
+
+Walltime = Annotated[
+    str | None, typer.Option(metavar="HH:MM:SS", help="end with a checkpoint before this time", show_default="none")
+]
+
+Retry = Annotated[int, typer.Option(help="how often a run that breaks down goes back and on with half the time step")]
+
+Threads = Annotated[int | None, typer.Option(help="number of threads", show_default="the run's")]
+
+WORDS = {int: "a whole number", float: "a number"}
+
+METAVARS = {int: "INTEGER", float: "FLOAT"}
+
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="run folder")]
+
+
+def case_command(model: type[cases.Case], action: Callable[..., None]) -> Callable[..., None]:
+    """Return a command for a case: `action` called with the configuration that the options make."""
+    own = list(inspect.signature(action).parameters.values())[1:]
+
+    @exit_codes()
+    def command(context: typer.Context, **values: Any) -> None:
+        extra = {parameter.name: values.pop(parameter.name) for parameter in own}
+        tables = (context.obj or Config(model())).tables()
+        for name in cases.method.superseded(values):
+            tables.pop(name, None)
+        for name, value in values.items():
+            if value is not None:
+                (tables["run"] if name in RunSettings.model_fields else tables)[name] = value
+        action(config.from_tables(tables), **extra)
+
+    first = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
+    keywords = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own]
+    parameters = [
+        first,
+        *keywords,
+        *_options(model, model.parameter_names(), {}),
+        *_options(
+            RunSettings, RunSettings.model_fields, {"until": f"{model().default_until:g}", "threads": "all cores"}
+        ),
+    ]
+    functools.update_wrapper(command, action)
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return command
+
+
+def _options(model: type[Parameters], names: Iterable[str], defaults: Mapping[str, str]) -> Iterator[inspect.Parameter]:
+    """Make an option of each named field of a model; `defaults` says what stands for None."""
+    for name in names:
+        kind, choices = _option_type(model.model_fields[name].annotation)
+        flag = f"--{name.replace('_', '-')}"
+        option = typer.Option(
+            f"{flag}/--no-{flag[2:]}" if kind is bool else flag,
+            help=f"{model.describe(name)}  [default: {defaults.get(name) or describe_default(model, name)}]",
+            show_default=False,
+            metavar="|".join(map(str, choices)) or METAVARS.get(kind),
+            parser=_choice_of(choices) if choices else _number_of(kind) if kind in WORDS else None,
+        )
+        yield inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=None,
+            annotation=Annotated[Union[kind, None], option],  # noqa: UP007
+        )
+
+
+def _option_type(annotation: Any) -> tuple[type, tuple[Any, ...]]:
+    """Return the type that an option is read as, and its choices if there are few."""
+    if get_origin(annotation) in (Union, types.UnionType):
+        annotation = next(member for member in get_args(annotation) if member is not type(None))
+    if get_origin(annotation) is Literal:
+        return str, get_args(annotation)
+    return annotation, ()
+
+
+def _choice_of(choices: tuple[Any, ...]) -> Callable[[str], Any]:
+    """Return a function that finds the choice with a given text."""
+
+    def choice(text: str) -> Any:
+        return next((choice for choice in choices if str(choice) == text), text)
+
+    return choice
+
+
+def _number_of(kind: type[int | float]) -> Callable[[str], int | float]:
+    """Return a function that reads a number, and says what is wrong with one."""
+
+    def number(text: str) -> int | float:
+        try:
+            return kind(text)
+        except ValueError:
+            raise typer.BadParameter(f"must be {WORDS[kind]}, not {shown(text)}") from None
+
+    return number

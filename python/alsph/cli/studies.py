@@ -1,0 +1,101 @@
+"""The commands of alsph study."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from alsph import study
+from alsph.cases.remarks import keywords, tally
+from alsph.cli.options import Jobs, Preset, Scheduler, StudyName, StudyOutput, Walltime
+from alsph.cli.terminal import complain, exit_codes, say, say_table
+from alsph.running.control import seconds_of
+from alsph.study.board import overview
+from alsph.text import printable
+
+
+class StudyGroup(TyperGroup):
+    """``alsph study NAME`` stands for ``alsph study run NAME``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put ``run`` before anything that is no command."""
+        if args and args[0] not in (*self.commands, "--help"):
+            args = ["run", *args]
+        return super().parse_args(ctx, args)
+
+
+study_app = typer.Typer(
+    cls=StudyGroup,
+    no_args_is_help=True,
+    subcommand_metavar="NAME|FILE.toml [OPTIONS] | COMMAND",
+    help="Run a parameter study, draw its figures and write its tables.",
+    epilog="alsph study NAME stands for alsph study run NAME. Start with: alsph study list",
+)
+
+
+@study_app.command("run")
+@exit_codes()
+def _study_run(
+    name: StudyName,
+    preset: Preset = None,
+    output: StudyOutput = Path("runs/studies"),
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="only tell what would be run")] = False,
+    jobs: Jobs = None,
+    threads: Annotated[int, typer.Option(help="threads of each run")] = 1,
+    scheduler: Scheduler = None,
+    walltime: Walltime = None,
+) -> None:
+    """Run what is missing of a study, draw its figures and write its tables.
+
+    Runs are named by a hash of their configuration: those that have finished are used again, also by other studies,
+    and those that were cut go on. The exit code is 1 if a run failed; one that diverged is a result.
+    """
+    declared = study.load(name, preset)
+    if dry_run:
+        study.check_names(declared, declared.points())
+        _print_states(declared, output)
+        return
+    results = study.run(
+        declared, output, jobs=jobs, threads=threads, scheduler=scheduler, walltime=seconds_of(walltime)
+    )
+    say(f"\n{results}")
+    _print_results(results)
+    raise typer.Exit(not results.complete)
+
+
+@study_app.command("status")
+@exit_codes()
+def _study_status(name: StudyName, preset: Preset = None, output: StudyOutput = Path("runs/studies")) -> None:
+    """Tell how far the runs of a study are, whoever runs them."""
+    _print_states(study.load(name, preset), output)
+
+
+@study_app.command("draw")
+@exit_codes()
+def _study_draw(name: StudyName, preset: Preset = None, output: StudyOutput = Path("runs/studies")) -> None:
+    """Write tables and figures of the runs that there are, without running anything."""
+    declared = study.load(name, preset)
+    results = study.Results.of(declared, declared.points(), output)
+    results.save()
+    _print_results(results)
+
+
+@study_app.command("list")
+def _study_list() -> None:
+    """List the studies that come with alsph."""
+    say_table([(name, study.load(name).title) for name in study.shipped()])
+
+
+def _print_results(results: study.Results) -> None:
+    for warning in results.warnings:
+        complain(f"warning: {warning}", "yellow")
+    say(results.path / "results.md")
+
+
+def _print_states(declared: study.Study, output: Path) -> None:
+    points = declared.points()
+    for line in overview(points, study.states(points, output)):
+        say(printable(line))
+    if remarked := tally([keywords(point.config.case.remarks()) for point in points]):
+        say(f"remarks: {remarked}")

@@ -1,0 +1,1 @@
+"""The engine: what it is told, and the one edge to it."""

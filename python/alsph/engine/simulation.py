@@ -1,0 +1,419 @@
+"""The simulation: particles, and the means to step them. The only Python module that calls the engine."""
+
+import json
+import math
+import operator
+import os
+import threading
+import time as clock
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from alsph import _alsph
+from alsph.arrays import FloatArray
+from alsph.engine.inflow import Inflow, Prescription, backflow
+from alsph.engine.problem import Problem
+from alsph.errors import ConfigError, SharedError, SolverError
+from alsph.geometry.particles import Kind
+from alsph.text import shown
+
+VERSION = _alsph.__version__
+
+SLICE_SECONDS = 0.2
+"""Longest time in the engine without a look at signals, so that Ctrl-C works."""
+
+
+def instructions() -> str:
+    """Return the instruction set that the engine's loops use on this machine."""
+    return _alsph.instructions()
+
+
+def bytes_per_particle(settings: dict[str, Any]) -> float:
+    """Return the engine's estimated memory per particle [bytes]."""
+    with _translated():
+        return _alsph.bytes_per_particle(json.dumps(settings))
+
+
+def time_step_limits(settings: dict[str, Any], velocity_max: float) -> dict[str, float]:
+    """Return the largest steps by ``courant``, ``penalty``, ``viscous``, ``body_force`` [D/U], and ``lambda_max``."""
+    with _translated():
+        return _alsph.time_step_limits(json.dumps(settings), velocity_max)
+
+
+TYPES: dict[str, tuple[type[np.generic], int]] = {
+    "position": (np.float64, 2),
+    "velocity": (np.float64, 2),
+    "pressure": (np.float64, 1),
+    "kind": (np.uint8, 1),
+    "body": (np.uint16, 1),
+    "normal": (np.float64, 2),
+    "depth": (np.float64, 1),
+    "id": (np.uint64, 1),
+}
+"""The arrays of a state: their types and numbers of dimensions."""
+
+
+@contextmanager
+def _translated() -> Iterator[None]:
+    try:
+        yield
+    except _alsph.ConfigError as error:
+        raise ConfigError(str(error)) from None
+    except _alsph.SolverError as error:
+        raise SolverError(str(error)) from None
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":  # that of the engine's edge to Python, which it does not export
+            raise
+        raise SolverError(f"the engine gave up, probably as it was out of memory: {error}") from None
+
+
+def _exact(name: str, values: ArrayLike, kind: type[np.generic], dimensions: int | None = None) -> NDArray[Any]:
+    """Return an array of the type that the engine takes, if that changes no value.
+
+    Raises
+    ------
+    ConfigError
+        If it does, or the array has another number of dimensions.
+    """
+    wanted = "numbers" if kind == np.float64 else f"whole numbers from 0 to {256 ** np.dtype(kind).itemsize - 1}"
+    try:
+        given = np.asarray(values)
+        given = given if given.dtype.kind in "iufb" else np.array(None)
+        with np.errstate(all="ignore"):
+            exact = np.ascontiguousarray(given, kind)
+        if not np.array_equal(given, exact, equal_nan=kind == np.float64):
+            raise ValueError
+    except (TypeError, ValueError):
+        raise ConfigError(f"array `{name}`: must hold {wanted}") from None
+    if dimensions and exact.ndim != dimensions:
+        raise ConfigError(f"array `{name}`: must have {dimensions} dimensions, and has {exact.ndim}")
+    return exact
+
+
+def _whole(name: str, value: Any) -> int:
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise ConfigError(f"{name} = {shown(value)}: must be a whole number") from None
+
+
+def _number(name: str, value: Any) -> float:
+    try:
+        number = math.nan if isinstance(value, str) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if math.isnan(number):
+        raise ConfigError(f"{name} = {shown(value)}: must be a number")
+    return number
+
+
+class Simulation:
+    """State and stepping of one simulation.
+
+    Parameters
+    ----------
+    problem
+        Settings and particles, for instance from ``case.build()``.
+    threads
+        Number of threads; all cores if None. The result does not depend on it.
+    until
+        Default end time of :meth:`steps`.
+
+    Raises
+    ------
+    ConfigError
+        If the settings or the particles cannot be used.
+
+    Warns
+    -----
+    RuntimeWarning
+        Once, if fluid is to leave through an inlet in places (:attr:`backflow`).
+
+    Attributes
+    ----------
+    inflow : function, optional
+        The rule that :meth:`set_inflow` was given.
+    prescribed : Prescription, optional
+        What it gave before the last step.
+    backflow : str
+        The warning of fluid that leaves through an inlet; empty without.
+    """
+
+    def __init__(self, problem: Problem, threads: int | None = None, until: float = math.inf) -> None:
+        self.problem = problem
+        self.until = until
+        self.inflow: Inflow | None = None
+        self.prescribed: Prescription | None = None
+        self.backflow = ""
+        self._history: list[dict[str, NDArray[Any]]] = []
+        self._start(problem.state, threads)
+
+    def _start(self, state: dict[str, Any], threads: int | None) -> None:
+        if threads is not None and not (isinstance(threads, int) and threads >= 1):
+            raise ConfigError(f"threads = {shown(threads)}: must be a whole number, 1 or more")
+        exact = {name: _exact(name, state[name], *TYPES[name]) if name in TYPES else state[name] for name in state}
+        with _translated():
+            self._engine_of_process = _alsph.Simulation(json.dumps(self.problem.settings), exact, threads)
+        self._process, self._user = os.getpid(), threading.RLock()
+        inlet = np.asarray(state["kind"]) == Kind.INLET
+        self._check_inflow(np.asarray(state["position"])[inlet], np.asarray(state["velocity"])[inlet])
+
+    @contextmanager
+    def _engine(self) -> Iterator[_alsph.Simulation]:
+        """Give the engine to one thread at a time, of the process whose threads it steps with.
+
+        Raises
+        ------
+        SharedError
+            If another thread has it, or the process is a forked one, which has none of those threads.
+        """
+        if os.getpid() != self._process:
+            raise SharedError(
+                f"this simulation was made in process {self._process}, whose threads the forked process {os.getpid()} "
+                "does not have; make the simulation there"
+            )
+        if not self._user.acquire(blocking=False):
+            raise SharedError(
+                "this simulation is in use by another thread; let one thread at a time use it, or make two"
+            )
+        try:
+            with _translated():
+                yield self._engine_of_process
+        except SolverError as error:
+            if not self.backflow:
+                raise
+            raise SolverError(f"{error}; before, {self.backflow}") from None
+        finally:
+            self._user.release()
+
+    def __repr__(self) -> str:
+        """Name the time, the step and the particles."""
+        if os.getpid() != self._process:
+            return f"Simulation(of process {self._process})"
+        particles = ", ".join(f"{count} {kind}" for kind, count in self.counts.items() if count)
+        return f"Simulation(t* = {self.time:.4g}, step {self.step}: {particles})"
+
+    @property
+    def time(self) -> float:
+        """Time reached [D/U]."""
+        with self._engine() as engine:
+            return engine.time
+
+    @property
+    def step(self) -> int:
+        """Number of steps taken."""
+        with self._engine() as engine:
+            return engine.step
+
+    @property
+    def threads(self) -> int:
+        """Number of threads."""
+        with self._engine() as engine:
+            return engine.threads
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of particles by kind: ``fluid``, ``inlet``, ``outlet``, ``solid``."""
+        with self._engine() as engine:
+            return engine.counts
+
+    def advance(self, steps: int = 1, wall_seconds: float = math.inf) -> int:
+        """Take up to `steps` steps, stop early after `wall_seconds`, and return the number taken.
+
+        Raises
+        ------
+        SolverError
+            If the computation breaks down.
+        """
+        steps = _whole("steps", steps)
+        with self._engine() as engine:
+            first = engine.step
+            for seconds in _slices(wall_seconds):
+                left = first + steps - engine.step
+                if left <= 0:
+                    break
+                engine.advance(self._prescribe(left), seconds)
+            return engine.step - first
+
+    def run_until(self, time: float, wall_seconds: float = math.inf) -> bool:
+        """Step until ``self.time >= time`` (True) or `wall_seconds` have passed (False).
+
+        The time step is never clipped, so the time reached lies up to one step beyond `time`.
+
+        Raises
+        ------
+        SolverError
+            If the computation breaks down.
+        """
+        time = _number("time", time)
+        with self._engine() as engine:
+            for seconds in _slices(wall_seconds):
+                if engine.time >= time:
+                    break
+                if self._prescribe(2) == 1:
+                    engine.advance(1)
+                else:
+                    engine.advance_until(time, seconds)
+            return engine.time >= time
+
+    def steps(self, every: float, until: float | None = None) -> Iterator[dict[str, NDArray[Any]]]:
+        """Step to the next multiple of `every` [D/U], yield a :meth:`snapshot`, and so on until `until`."""
+        if not 0 < _number("every", every) < math.inf:
+            raise ConfigError(f"every = {every}: must be a positive number [D/U]")
+        until = self.until if until is None else _number("until", until)
+        while self.time < until:
+            self.run_until(min(next_multiple(self.time, every), until))
+            yield self.snapshot()
+
+    def snapshot(self) -> dict[str, NDArray[Any]]:
+        """Return the particles.
+
+        Returns
+        -------
+        dict
+            ``position``, ``velocity``, ``normal`` (n, d), ``pressure``, ``volume``, ``velocity_divergence``, ``kind``,
+            ``body``, ``depth``, ``id`` (n,) and ``vorticity``, (n,) in 2-D and (n, 3) in 3-D; and the numbers ``time``,
+            ``step``, ``mass_in``, ``mass_out`` and ``next_id``.
+        """
+        with self._engine() as engine:
+            return engine.snapshot()
+
+    def breakdown(self) -> list[tuple[float, dict[str, NDArray[Any]]]]:
+        """Return time and particles, as :meth:`snapshot` does, before and after the step that broke down.
+
+        Those after it are at the positions before it. If no step has broken down, the present ones are all.
+        """
+        with self._engine() as engine:
+            before, after = engine.snapshot(), engine.failed_snapshot()
+        return [(self.time, before)] + ([] if after is None else [(math.nextafter(self.time, math.inf), after)])
+
+    def history(self) -> dict[str, NDArray[Any]]:
+        """Return one row for each step taken so far.
+
+        Returns
+        -------
+        dict
+            The columns of docs/architecture.md, and the force coefficients where the case has a body.
+        """
+        rows = self.new_history()
+        if not self._history:
+            return rows
+        self._history = [{name: np.concatenate([rows[name] for rows in self._history]) for name in self._history[0]}]
+        return self._history[0]
+
+    def new_history(self, *, keep: bool = True) -> dict[str, NDArray[Any]]:
+        """Return the rows of the history since the last call of this method or of :meth:`history`.
+
+        Unless they are to be kept for :meth:`history`, which takes memory as long as the simulation lives.
+        """
+        with self._engine() as engine:
+            rows = engine.take_history()
+        rows = {"step": rows["step"], **rows, **self._coefficients(rows)}
+        if keep and len(rows["step"]):
+            self._history.append(rows)
+        return rows
+
+    def _coefficients(self, rows: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+        """Drag and lift coefficients of the case's bodies with their parts: force / (½ρU²D), eqs. (21) and (22)."""
+        names = [body["name"] for body in self.problem.settings["bodies"]]
+        bodies = [names.index(name) for name in self.problem.coefficient_bodies if name in names]
+        if not bodies:
+            return {}
+        pressure, viscous = (2 * rows[f"{part}_force"][:, bodies].sum(axis=1) for part in ("pressure", "viscous"))
+        columns: dict[str, NDArray[Any]] = {}
+        for axis, name in enumerate(("drag", "lift")):
+            columns |= {
+                f"{name}_coefficient": pressure[:, axis] + viscous[:, axis],
+                f"{name}_pressure": pressure[:, axis],
+                f"{name}_viscous": viscous[:, axis],
+            }
+        return columns
+
+    def sample(self, points: FloatArray) -> dict[str, FloatArray]:
+        """Return the fluid's ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d); NaN far from all fluid."""
+        with self._engine() as engine:
+            return engine.sample(_exact("points", points, np.float64, 2))
+
+    def inflow_position(self) -> FloatArray:
+        """Return the positions (m, d) of the inlet particles."""
+        with self._engine() as engine:
+            return engine.inflow_position()
+
+    def set_inflow(self, velocity: ArrayLike | Inflow) -> None:
+        """Prescribe the velocity of the inlet particles.
+
+        Parameters
+        ----------
+        velocity
+            An array (d,) or, in the order of :meth:`inflow_position`, (m, d), which the particles keep and hand on to
+            those that follow them [U]; or a function of their positions (m, d) [D] and the time [D/U] that returns such
+            an array and is called before every step. The rule of a case is better its :meth:`alsph.cases.Case.inflow`.
+
+        Raises
+        ------
+        ConfigError
+            If it is no such array, or more fluid would leave through an inlet than enter.
+        """
+        self.inflow, self.prescribed = (velocity if callable(velocity) else None), None
+        if callable(velocity):
+            nothing = self.inflow_position()[:0]
+            self.prescribed = Prescription(self.time, nothing, nothing)
+        else:
+            self._apply(velocity, self.inflow_position())
+
+    def _prescribe(self, steps: int) -> int:
+        """Apply an inflow given as a function; return how many of `steps` may be taken until it is due again."""
+        if self.inflow is None:
+            return steps
+        position = self.inflow_position()
+        velocity = self.inflow(position.copy(), self.time)
+        if velocity is not None:
+            self.prescribed = Prescription(self.time, position, self._apply(velocity, position))
+        return 1
+
+    def _apply(self, velocity: ArrayLike, position: FloatArray) -> FloatArray:
+        """Give the inlet particles at `position` (m, d) a velocity, (d,) or (m, d), and return it as (m, d)."""
+        values = _exact("inflow velocity", velocity, np.float64)
+        with self._engine() as engine:
+            engine.set_inflow(values)  # refuses wrong shapes
+        every = np.broadcast_to(values, position.shape)
+        self._check_inflow(position, every)
+        return every
+
+    def _check_inflow(self, position: FloatArray, velocity: FloatArray) -> None:
+        """Refuse backflow at an inlet, and warn once of such in places."""
+        warning = backflow(self.problem.settings["domain"], position, velocity, self.time)
+        if warning and not self.backflow:
+            self.backflow = warning
+            warnings.warn(warning, RuntimeWarning, stacklevel=4)
+
+    def state(self) -> dict[str, Any]:
+        """Return all that :meth:`restore` needs to go on from here to the last bit (an inflow function excepted)."""
+        with self._engine() as engine:
+            return engine.state()
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go back to a state that :meth:`state` has returned; the history starts anew."""
+        self._start(state, self.threads)
+        self._history = []
+        if self.inflow is not None:
+            self.set_inflow(self.inflow)
+
+
+def next_multiple(time: float, interval: float) -> float:
+    """Return the smallest multiple of `interval` after `time`, the same one for each time up to it, to the last bit."""
+    count = math.floor(min(time / interval, 1e300))
+    multiples = ((count + k) * interval for k in range(3))
+    return next((multiple for multiple in multiples if multiple > time), math.nextafter(time, math.inf))
+
+
+def _slices(wall_seconds: float) -> Iterator[float]:
+    """Yield the lengths of short slices of `wall_seconds` until they have passed."""
+    end = clock.monotonic() + wall_seconds
+    while (left := end - clock.monotonic()) > 0:
+        yield min(left, SLICE_SECONDS)

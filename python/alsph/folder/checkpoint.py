@@ -1,0 +1,168 @@
+"""Checkpoints: all that a run needs to go on to the last bit, in one HDF5 file whose damage is noticed.
+
+The first 512 bytes, which HDF5 leaves to its user, hold the format's name and version and the SHA-256 of all that
+follows, so that a damaged file is refused before the HDF5 library sees it. Behind them are the arrays of
+:meth:`alsph.Simulation.state`, its numbers as attributes, the case as the bytes of a JSON text and, where the inflow is
+prescribed by a rule, what it gave last. Version 1 had neither head nor case.
+"""
+
+import hashlib
+import io
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import h5py
+import numpy as np
+
+from alsph.engine.inflow import Prescription
+from alsph.errors import DamagedError, RunFolderError
+from alsph.folder.durable import replacing
+from alsph.folder.reading import DAMAGE, rows, sound
+
+VERSION = 2
+HEAD_BYTES = 512
+NAME = b"alsph checkpoint"
+HDF5 = b"\x89HDF\r\n\x1a\n"
+CASE = "case"
+INFLOW = {"time": "inflow_time", "position": "inflow_position", "velocity": "inflow_velocity"}
+ARRAYS = ("position", "velocity", "pressure", "kind", "body", "normal", "depth", "id")
+READ_BYTES = 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """What a checkpoint holds.
+
+    Attributes
+    ----------
+    state : dict
+        See :meth:`alsph.Simulation.state`.
+    case : dict, optional
+        The tables of the case that the run was made with; None in a checkpoint of version 1.
+    warning : str
+        Why it is not the newest one.
+    inflow : Prescription, optional
+        What the rule for the inflow gave last; None without a rule, and in a checkpoint of an older alsph.
+    """
+
+    state: dict[str, Any]
+    case: dict[str, Any] | None
+    warning: str = ""
+    inflow: Prescription | None = None
+
+
+def write(
+    path: Path,
+    previous: Path | None,
+    state: dict[str, Any],
+    case: dict[str, Any],
+    inflow: Prescription | None = None,
+) -> None:
+    """Write a checkpoint; the one that was there becomes `previous`."""
+    content = io.BytesIO()  # the HDF5 library does not bear a disk that fails
+    with h5py.File(content, "w", userblock_size=HEAD_BYTES) as file:
+        file[CASE] = np.frombuffer(json.dumps(case).encode(), np.uint8)
+        for name, value in state.items():
+            if np.ndim(value):
+                file.create_dataset(name, data=value, compression="gzip", compression_opts=1, shuffle=True)
+            else:
+                file.attrs[name] = value
+        for name, key in INFLOW.items() if inflow else ():
+            file[key] = np.atleast_1d(getattr(inflow, name))
+    head = b"%s\nversion %d\nsha256 %s\n" % (NAME, VERSION, _hash(content).encode())
+    content.seek(0)
+    content.write(head.ljust(HEAD_BYTES, b"\0"))
+    with replacing(path, keep=previous) as temporary:
+        temporary.write_bytes(content.getbuffer())
+
+
+def read(path: Path) -> Checkpoint:
+    """Read a checkpoint.
+
+    Raises
+    ------
+    DamagedError
+        If it is missing, damaged, or no checkpoint.
+    RunFolderError
+        If it is of a version to come, or the disk fails.
+    """
+    try:
+        path.open("rb").close()
+    except FileNotFoundError:
+        raise DamagedError(f"{path.parent}: not a run folder that alsph can resume, it has no {path.name}") from None
+    except OSError as error:
+        raise RunFolderError(f"{path}: cannot be read: {error.strerror}") from None
+    try:
+        _check_head(path)
+        with h5py.File(path, "r", locking=False) as file:
+            state = {name: _number(file, name) for name in file.attrs}
+            state |= {name: rows(sound(file, name)) for name in ARRAYS if name in file}
+            case = json.loads(rows(sound(file, CASE)).tobytes()) if CASE in file else None
+            inflow = _inflow(file)
+        if not isinstance(case, dict | None):
+            raise ValueError("its case is no table")
+        if not state.keys() >= {"time", "step", "position"}:
+            raise ValueError("it has no time, step or position")
+        return Checkpoint(state, case, inflow=inflow)
+    except DAMAGE as error:
+        raise DamagedError(f"{path}: not a checkpoint, or damaged: {error}") from None
+
+
+def digest(state: dict[str, Any]) -> str:
+    """Return the SHA-256 of a state: two that have the same are the same to the last bit, in whatever order."""
+    total = hashlib.sha256()
+    order = np.argsort(state["id"]) if "id" in state else slice(None)
+    for name in sorted(state):
+        value = np.asarray(state[name])
+        value = np.ascontiguousarray(value[order] if value.ndim else value)
+        total.update(f"{name} {value.dtype.str} {value.shape}".encode())
+        total.update(value.data)
+    return total.hexdigest()
+
+
+def _number(file: h5py.File, name: str) -> Any:
+    """Return an attribute that is a number; others are not read."""
+    attribute = file.attrs.get_id(name)
+    if attribute.dtype.kind not in "iufb" or attribute.shape != ():
+        raise ValueError(f"{name} is no number")
+    return file.attrs[name].item()
+
+
+def _inflow(file: h5py.File) -> Prescription | None:
+    """Return what the rule for the inflow gave last, if there was one."""
+    if INFLOW["time"] not in file:
+        return None
+    time, position, velocity = (np.asarray(sound(file, key)[()], float) for key in INFLOW.values())
+    if time.shape != (1,) or position.ndim != 2 or position.shape != velocity.shape:
+        raise ValueError("its inflow is incomplete")
+    return Prescription(float(time[0]), position, velocity)
+
+
+def _check_head(path: Path) -> None:
+    """Check name, version and checksum."""
+    with path.open("rb") as file:
+        head = file.read(HEAD_BYTES)
+    if head.startswith(HDF5):
+        return  # version 1
+    lines = head.rstrip(b"\0").split(b"\n")
+    if lines[0] != NAME:
+        raise ValueError("its first bytes are not those of a checkpoint")
+    version = lines[1].removeprefix(b"version ").decode()
+    if not version.isdecimal() or int(version) > VERSION:
+        raise RunFolderError(
+            f"{path}: a checkpoint of version {version}, and this alsph reads up to {VERSION}; use a newer alsph"
+        )
+    with path.open("rb") as file:
+        if lines[2].removeprefix(b"sha256 ") != _hash(file).encode():
+            raise ValueError("its checksum does not fit its content")
+
+
+def _hash(file: BinaryIO) -> str:
+    """SHA-256 of what follows the head."""
+    total = hashlib.sha256()
+    file.seek(HEAD_BYTES)
+    while part := file.read(READ_BYTES):
+        total.update(part)
+    return total.hexdigest()

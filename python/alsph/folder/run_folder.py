@@ -1,0 +1,441 @@
+"""The run folder, as it is written: see docs/architecture.md for its files.
+
+Whatever cuts a run, it can be resumed: see :mod:`alsph.folder.durable`. One process at a time writes to a
+folder, which holds its lock; the files themselves are not locked, so that a viewer that has one open stops no run.
+"""
+
+import csv
+import itertools
+import json
+import os
+import platform
+import re
+import shutil
+import time as clock
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import filelock
+import numpy as np
+from numpy.typing import NDArray
+
+from alsph.arrays import AXES, FloatArray, size_of
+from alsph.engine.inflow import Prescription
+from alsph.errors import DamagedError, RunFolderError
+from alsph.folder import checkpoint, reading, vtkhdf
+from alsph.folder.checkpoint import Checkpoint
+from alsph.folder.durable import flush, growing, replacing
+from alsph.folder.reading import DAMAGE, sound
+from alsph.text import printable
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+LOCK = ".lock"
+CHECKPOINTS = ("checkpoint.h5", "checkpoint.previous.h5")
+START = "start.h5"
+"""The particles that a run began with, in the form of a checkpoint, where they are not its case's own."""
+MARKS = ("case.toml", "run.json")
+"""What tells that a folder is a run folder."""
+OWN = re.compile(
+    r"\.?(case\.toml|run\.json|run\.log|\.?lock|(checkpoint(\.previous)?|history|particles|surface|start|breakdown)(\.damaged\d*)?"
+    r"\.(h5|csv|vtkhdf))(\.new|\.journal)?"
+    r"|(ledger|forces|spectrum|pressure(_coefficient)?|vorticity|velocity(_divergence|_at_tu_d_\w+)?|kinetic_energy"
+    r"|[uv]_at_[xy]_d_2)\.png"
+)
+"""Names of the files that alsph makes in a run folder and its figures, and removes when the folder is replaced."""
+UNFINISHED = ("starting", "running", "interrupted")
+"""What ``run.json`` says of a run that goes on or can go on."""
+SPARE_BYTES = 2 * 2**20
+"""Room that must stay free on the disk beside what is written next."""
+PATIENCE_SECONDS = 2.0
+"""How long the lock of a folder is waited for: a killed process holds it while the system clears it away."""
+
+
+class Declared(Protocol):
+    """What a run folder is made for: a case and its settings (:class:`alsph.config.Config`)."""
+
+    @property
+    def name(self) -> str:
+        """Name of the case."""
+
+    @property
+    def until(self) -> float:
+        """End time [D/U]."""
+
+    def text(self) -> str:
+        """Return all parameters as TOML."""
+
+
+@dataclass
+class RunFolder:
+    """A run folder that is being written.
+
+    Raises
+    ------
+    RunFolderError
+        From every method, if the folder cannot be read or written.
+    """
+
+    path: Path
+    _claim: os.stat_result | None = field(default=None, init=False, repr=False)
+
+    def check_new(self, *, force: bool, configuration: Declared | None = None) -> None:
+        """Check, without touching anything, that the folder can be created (or, with `force`, replaced)."""
+        if self.path.exists():
+            found = {entry.name for entry in self.path.iterdir()} if self.path.is_dir() else {self.path.name}
+            if found - {LOCK} and not force:
+                raise RunFolderError(
+                    f"{self.path}: exists already; give another folder, `alsph resume` it, or use --force"
+                )
+            if found - {LOCK} and not self._is_replaceable(configuration):
+                raise RunFolderError(
+                    f"{self.path}: not a run folder, so --force does not replace it, without its "
+                    f"{' and '.join(MARKS)}; give another folder"
+                )
+        parent = next(parent for parent in self.path.absolute().parents if parent.exists())
+        if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
+            raise RunFolderError(f"{self.path}: cannot be created, {parent} is not a folder that can be written to")
+
+    def _is_replaceable(self, configuration: Declared | None) -> bool:
+        """Whether the folder is that of a run, or was about to become that of this one when it was cut."""
+        case, info = (self._file(name) for name in MARKS)
+        try:
+            if info.exists():
+                return case.is_file() and "status" in reading.info(info)
+            return configuration is not None and case.read_bytes() == configuration.text().encode()
+        except (OSError, RunFolderError):
+            return False
+
+    @contextmanager
+    def claimed(self) -> Iterator[None]:
+        """Hold the folder, which is made if it does not exist; another process that wants to write to it is refused."""
+        with self._writing():
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._check_entries()
+            lock = filelock.FileLock(self._file(LOCK), timeout=PATIENCE_SECONDS, fallback_to_soft=False)
+            try:
+                lock.acquire()
+            except filelock.Timeout:
+                raise RunFolderError(f"{self.path}: {self._holder()}; wait for it or stop it first") from None
+            self._claim = self._file(LOCK).stat()
+        try:
+            yield
+        finally:
+            self._claim = None
+            lock.release()
+
+    def _check_entries(self) -> None:
+        """Refuse a folder through which files elsewhere would be written."""
+        for entry in self.path.iterdir():
+            if entry.is_symlink() or not (entry.is_file() or entry.is_dir()):
+                raise RunFolderError(
+                    f"{entry}: a link or a special file; alsph does not write to a folder that has one"
+                )
+
+    def is_busy(self) -> bool | None:
+        """Whether a living process, wherever it is, holds the folder; None where that cannot be told."""
+        try:
+            if fcntl is None:
+                if self._file(LOCK).exists():
+                    with filelock.FileLock(self._file(LOCK), timeout=0, fallback_to_soft=False):
+                        pass
+            else:  # a lock that is shared with others who look, and needs no right to write
+                with self._file(LOCK).open("rb") as file:
+                    fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            return False
+        except (BlockingIOError, filelock.Timeout):
+            return True
+        except FileNotFoundError:
+            return False
+        except OSError:  # a lock that cannot be read
+            return None
+
+    def _holder(self) -> str:
+        """Who is at work in the folder, in words."""
+        info = self.last_info()
+        machine = info.get("machine")
+        name = machine.get("name") if isinstance(machine, dict) else None
+        return f"process {info.get('pid', '?')} on {name or 'a machine not known'} is still running it"
+
+    def create(self, configuration: Declared, size: int = 0) -> None:
+        """Begin with the resolved configuration if `size` bytes will fit; alsph's own files of before are removed."""
+        self._make_room(size)
+        with self._writing():
+            self.path.mkdir(parents=True, exist_ok=True)
+            if self._file("run.json").exists():
+                self.announce(configuration)  # before the run that it tells of is no more
+            for path in [*self.path.iterdir(), *self._file("figures").glob("*.png")]:
+                # What tells that this is a run folder stays, so that a cut leaves one.
+                if OWN.fullmatch(path.name) and path.name not in (*MARKS, LOCK) and not path.is_dir():
+                    path.unlink()
+            with suppress(OSError):  # unless there is something of the user's in it
+                self._file("figures").rmdir()
+        self.write_config(configuration)
+
+    def announce(self, configuration: Declared) -> None:
+        """Replace ``run.json`` by that of a run before its first step."""
+        facts = {"status": "starting", "case": configuration.name, "until": configuration.until}
+        self.write_info(facts | {"pid": os.getpid(), "machine": {"name": platform.node()}})
+
+    def write_config(self, configuration: Declared) -> None:
+        """Replace ``case.toml``."""
+        with self._writing(), replacing(self._file("case.toml")) as path:
+            path.write_bytes(configuration.text().encode())
+
+    def info(self) -> dict[str, Any]:
+        """Return the content of ``run.json``."""
+        return reading.info(self._file("run.json"))
+
+    def last_info(self) -> dict[str, Any]:
+        """Return the same, or nothing where it is missing or damaged: what a run can go on without."""
+        try:
+            return self.info()
+        except RunFolderError:
+            return {}
+
+    def write_info(self, info: dict[str, Any]) -> None:
+        """Replace ``run.json``."""
+        with self._writing(), replacing(self._file("run.json")) as path:
+            path.write_text(json.dumps(info, indent=2) + "\n", encoding="utf-8")
+
+    def log(self, line: str) -> None:
+        """Append a line to ``run.log``."""
+        with self._writing(), self._file("run.log").open("a", encoding="utf-8") as file:
+            file.write(f"{clock.strftime('%Y-%m-%d %H:%M:%S')}  {printable(line)}\n")
+
+    def append_history(self, rows: dict[str, NDArray[Any]], bodies: list[str]) -> None:
+        """Append rows of :meth:`alsph.Simulation.new_history` to ``history.csv``."""
+        columns = flatten(rows, bodies)
+        self._make_room(2 * size_of(columns))
+        with self._writing(), self._file("history.csv").open("a", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            if file.tell() == 0:
+                writer.writerow(columns)
+            writer.writerows(history_lines(rows, bodies))
+
+    def append_particles(self, time: float, particles: dict[str, NDArray[Any]]) -> None:
+        """Append an output to ``particles.vtkhdf``."""
+        self._make_room(size_of(particles))
+        self._append("particles.vtkhdf", lambda path: vtkhdf.append(path, time, particles))
+
+    def append_surface(
+        self,
+        time: FloatArray,
+        angle: FloatArray,
+        pressure_coefficient: FloatArray,
+        geometry: Mapping[str, FloatArray] | None = None,
+    ) -> None:
+        """Append to ``surface.h5``: samples (k, m) of C_p at times (k,) and angles (m,) [degrees].
+
+        A new file also takes the `geometry` of the points, by name (:class:`alsph.geometry.surface.Surface`).
+        """
+        self._make_room(pressure_coefficient.nbytes)
+        points = {"angle": angle} | dict(geometry or {})
+        self._append("surface.h5", lambda path: _append_surface(path, time, points, pressure_coefficient))
+
+    def _append(self, name: str, append: Callable[[Path], None]) -> None:
+        """Append to a file; one that has been damaged since it was written last is set aside, and a new one begun."""
+        path = self._file(name)
+        with self._writing():
+            if remark := _unless_damaged(path, append):
+                self.log(f"warning: {remark}")
+                warnings.warn(f"{self.path}: {remark}", RuntimeWarning, stacklevel=2)
+                append(path)
+
+    def write_breakdown(self, outputs: list[tuple[float, dict[str, NDArray[Any]]]]) -> Path:
+        """Replace ``breakdown.vtkhdf``: the particles before and after the step that broke down."""
+        self._make_room(sum(size_of(particles) for _, particles in outputs))
+        path = self._file("breakdown.vtkhdf")
+        with self._writing(), replacing(path) as temporary:
+            for time, particles in outputs:
+                vtkhdf.append(temporary, time, particles)
+        return path
+
+    def write_start(self, state: dict[str, Any], case: dict[str, Any]) -> None:
+        """Write ``start.h5``."""
+        self._make_room(size_of(state))
+        with self._writing():
+            checkpoint.write(self._file(START), None, state, case)
+
+    def read_start(self) -> dict[str, Any] | None:
+        """Return the particles that the run began with, None if they are those of its case."""
+        return checkpoint.read(self._file(START)).state if self._file(START).exists() else None
+
+    def write_checkpoint(self, state: dict[str, Any], case: dict[str, Any], inflow: Prescription | None = None) -> None:
+        """Write ``checkpoint.h5``; the one before is kept. The history up to it is made safe first."""
+        self._make_room(size_of(state))
+        with self._writing():
+            if self._file("history.csv").exists():
+                flush(self._file("history.csv"))
+            checkpoint.write(self._file(CHECKPOINTS[0]), self._file(CHECKPOINTS[1]), state, case, inflow)
+
+    def has_checkpoint(self) -> bool:
+        """Whether there is a checkpoint, be it damaged."""
+        return any(self._file(name).exists() for name in CHECKPOINTS)
+
+    def read_checkpoint(self) -> Checkpoint:
+        """Return the newest checkpoint that is sound."""
+        errors: list[DamagedError] = []
+        for name in CHECKPOINTS:
+            try:
+                found = checkpoint.read(self._file(name))
+            except DamagedError as error:
+                errors.append(error)
+                continue
+            damaged = errors and self._file(CHECKPOINTS[0]).exists()
+            return replace(found, warning=f"{errors[0]}; going back to {name}") if damaged else found
+        raise errors[0]
+
+    def has_previous_checkpoint(self) -> bool:
+        """Whether there is one before the newest."""
+        return self._file(CHECKPOINTS[1]).exists()
+
+    def drop_newest_checkpoint(self) -> None:
+        """Let the checkpoint before the newest take its place."""
+        with self._writing():
+            self._file(CHECKPOINTS[1]).replace(self._file(CHECKPOINTS[0]))
+            flush(self.path)
+
+    def set_damaged_aside(self) -> None:
+        """Keep the newest checkpoint, which is damaged, from displacing the sound one before it."""
+        with self._writing():
+            self._file(CHECKPOINTS[0]).replace(self._file("checkpoint.damaged.h5"))
+
+    def truncate(self, step: int, time: float) -> list[str]:
+        """Drop the rows, outputs and samples later than a checkpoint, all of them before the first step.
+
+        Returns
+        -------
+        list of str
+            Which files were damaged; they are set aside under another name.
+        """
+        damaged = []
+        with self._writing():
+            if step == 0:
+                for name in ("history.csv", "particles.vtkhdf", "surface.h5"):
+                    self._file(name).unlink(missing_ok=True)
+            parts: dict[str, Callable[[Path], None]] = {
+                "history.csv": lambda path: _truncate_history(path, step),
+                "particles.vtkhdf": lambda path: vtkhdf.truncate(path, time),
+                "surface.h5": lambda path: _truncate_surface(path, time),
+            }
+            for name, cut in parts.items():
+                if self._file(name).exists() and (remark := _unless_damaged(self._file(name), cut)):
+                    damaged.append(remark)
+        return damaged
+
+    def _file(self, name: str) -> Path:
+        return self.path / name
+
+    def _make_room(self, size: int) -> None:
+        """Check that `size` bytes will fit, so that no file is left half-written by a full disk."""
+        existing = next(folder for folder in (self.path, *self.path.absolute().parents) if folder.exists())
+        free, needed = shutil.disk_usage(existing).free, size + SPARE_BYTES
+        if free < needed:
+            resumable = self.has_checkpoint()
+            remedy = f"go on with: alsph resume {self.path}" if resumable else "try again, or use another disk"
+            raise RunFolderError(
+                f"{self.path}: disk full, {free / 2**20:.1f} MiB are free and {needed / 2**20:.1f} MiB are needed; "
+                f"make room and {remedy}"
+            )
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        if self._claim and not _is_still(self._claim, self._file(LOCK)):
+            raise RunFolderError(f"{self.path}: was removed or replaced under the run, which has nowhere to write to")
+        try:
+            yield
+        except OSError as error:
+            raise RunFolderError(f"{self.path}: cannot be written: {error}") from None
+
+
+def _is_still(stat: os.stat_result, path: Path) -> bool:
+    """Whether a path leads to the same file as before."""
+    try:
+        return os.path.samestat(stat, path.stat())
+    except OSError:
+        return False
+
+
+def _unless_damaged(path: Path, change: Callable[[Path], None]) -> str:
+    """Change a file; if it is damaged, set it aside under another name and return what to say of it."""
+    there = path.exists()
+    try:
+        change(path)
+    except DAMAGE as error:
+        if not there or (isinstance(error, OSError) and error.errno is not None):  # the disk's, not the file's
+            raise
+        names = (path.with_name(f"{path.stem}.damaged{number or ''}{path.suffix}") for number in itertools.count())
+        aside = next(name for name in names if not name.exists())
+        path.replace(aside)
+        return f"{path.name} is damaged ({error}) and set aside as {aside.name}"
+    return ""
+
+
+def _append_surface(
+    path: Path, time: FloatArray, points: Mapping[str, FloatArray], pressure_coefficient: FloatArray
+) -> None:
+    with growing(path) as file:
+        count = len(points["angle"])
+        if "time" not in file:
+            for name, values in points.items():
+                file[name] = values
+            file.create_dataset("pressure_coefficient", (0, count), float, maxshape=(None, count), chunks=(64, count))
+            file.create_dataset("time", (0,), float, maxshape=(None,), chunks=(64,))
+        elif not (len(file["angle"]) == count and np.allclose(file["angle"], points["angle"])):
+            raise ValueError("it was sampled at other points, by another version of alsph")
+        samples = len(file["time"])
+        for name, values in (("pressure_coefficient", pressure_coefficient), ("time", time)):
+            file[name].resize(samples + len(values), axis=0)
+            file[name][samples:] = values
+
+
+def _truncate_history(path: Path, last: int) -> None:
+    """Keep the complete rows up to a step."""
+    with path.open("rb") as file, replacing(path) as new_path:
+        header = next(file, b"")
+        if header and not (header.startswith(b"step,") and header.endswith(b"\n")):
+            raise ValueError("its first line does not name its columns")
+        with new_path.open("wb") as new:
+            new.write(header)
+            for row in file:
+                number = row.split(b",")[0] if row.count(b",") == header.count(b",") and row.endswith(b"\n") else b""
+                if number.isdigit() and int(number) <= last:
+                    new.write(row)
+
+
+def _truncate_surface(path: Path, time: float) -> None:
+    with growing(path) as file:
+        keep = int(np.searchsorted(sound(file, "time")[:], time, side="right"))
+        for name in ("pressure_coefficient", "time"):
+            sound(file, name).resize(keep, axis=0)
+
+
+def flatten(rows: dict[str, NDArray[Any]], bodies: list[str]) -> dict[str, NDArray[Any]]:
+    """Return the history with vectors split into one column a component, ``BODY_pressure_force_x`` and so on."""
+    columns = {}
+    for name, values in rows.items():
+        if values.ndim == 1:
+            columns[name] = values
+            continue
+        for index, body in enumerate(bodies):
+            for component, axis in zip(values[:, index].T, AXES if values.shape[2] > 1 else ("",), strict=False):
+                columns[f"{body}_{name}_{axis}".rstrip("_")] = component
+    return columns
+
+
+def history_lines(rows: dict[str, NDArray[Any]], bodies: list[str]) -> list[list[str]]:
+    """Return the rows as they stand in ``history.csv``."""
+    columns = (map(_text, column.tolist()) for column in flatten(rows, bodies).values())
+    return [list(row) for row in zip(*columns, strict=True)]
+
+
+def _text(value: float) -> str:
+    return f"{value:.10g}" if isinstance(value, float) else str(int(value))

@@ -1,0 +1,1 @@
+"""Particles, lattices, solids, and the outlines of bodies."""

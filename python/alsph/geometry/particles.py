@@ -1,0 +1,90 @@
+"""Particles: their kinds, their arrays, and those of one time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from alsph.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
+
+
+class Kind(IntEnum):
+    """What a particle is."""
+
+    FLUID = 0
+    INLET = 1
+    OUTLET = 2
+    SOLID = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """The particles at one time, in units of D and U.
+
+    Attributes
+    ----------
+    time : float
+        tU/D.
+    position, velocity : ndarray, shape (n, d)
+    pressure, velocity_divergence : ndarray, shape (n,)
+        In ρU² and U/D.
+    vorticity : ndarray, shape (n,) in 2-D, (n, 3) in 3-D
+        In U/D.
+    kind : ndarray of uint8, shape (n,)
+        See :class:`alsph.geometry.particles.Kind`.
+    """
+
+    time: float
+    position: FloatArray
+    velocity: FloatArray
+    pressure: FloatArray
+    velocity_divergence: FloatArray
+    vorticity: FloatArray
+    kind: NDArray[np.uint8]
+
+    @property
+    def fluid(self) -> NDArray[np.bool_]:
+        """Fluid particles, those in the inlet and outlet buffers included, shape (n,)."""
+        return np.asarray(self.kind != Kind.SOLID)
+
+
+def neighbour_tree(position: FloatArray) -> KDTree:
+    """Return a tree to find the neighbours of points among positions (n, d)."""
+    from scipy.spatial import KDTree  # half a second that most commands do without
+
+    return KDTree(position)
+
+
+def particles(
+    kind: Kind,
+    position: FloatArray,
+    velocity: ArrayLike,
+    *,
+    pressure: ArrayLike = 0.0,
+    body: int = 0,
+    normal: ArrayLike = 0.0,
+    depth: ArrayLike = 0.0,
+) -> dict[str, NDArray[Any]]:
+    """Return the arrays of n particles of one kind; every other property is broadcast to `position` (n, d)."""
+    n = len(position)
+    return {
+        "position": position,
+        "velocity": np.broadcast_to(np.asarray(velocity, float), position.shape).copy(),
+        "pressure": np.broadcast_to(np.asarray(pressure, float), n).copy(),
+        "kind": np.full(n, kind, np.uint8),
+        "body": np.full(n, body, np.uint16),
+        "normal": np.broadcast_to(np.asarray(normal, float), position.shape).copy(),
+        "depth": np.broadcast_to(np.asarray(depth, float), n).copy(),
+    }
+
+
+def join(*groups: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Concatenate groups of particles."""
+    return {name: np.concatenate([group[name] for group in groups]) for name in groups[0]}

@@ -1,0 +1,23 @@
+"""Figures of runs and of their fields, as pure functions: results in, :class:`matplotlib.figure.Figure` out."""
+
+from alsph.plotting.curves import Curve, convergence, panels, pressure_coefficient, profile
+from alsph.plotting.histories import forces, ledger, spectrum
+from alsph.plotting.pictures import FIELDS, field, field_style, fields
+from alsph.plotting.style import remark, save
+
+__all__ = [
+    "FIELDS",
+    "Curve",
+    "convergence",
+    "field",
+    "field_style",
+    "fields",
+    "forces",
+    "ledger",
+    "panels",
+    "pressure_coefficient",
+    "profile",
+    "remark",
+    "save",
+    "spectrum",
+]

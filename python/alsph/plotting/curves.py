@@ -1,0 +1,202 @@
+"""Figures of profiles, surface pressure and convergence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from dataclasses import field as dataclass_field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alsph.analysis.loads import PressureCoefficient
+from alsph.analysis.measures import Profile
+from alsph.analysis.window import DEVELOPING
+from alsph.arrays import FloatArray
+from alsph.geometry.surface import Surface
+from alsph.plotting.style import blank
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def pressure_coefficient(
+    coefficient: PressureCoefficient, reference: tuple[FloatArray, FloatArray] | None = None
+) -> Figure:
+    """Mean C_p of both sides: of a body with a chord over x/c and the distance along the surface, suction up.
+
+    Of a cylinder it is drawn over the angle from the front stagnation point, folded on 0 to 180 degrees.
+
+    Parameters
+    ----------
+    coefficient : PressureCoefficient
+    reference : (abscissa, value), optional
+        A curve to compare with, over degrees from the front or x/c.
+    """
+    if coefficient.surface and coefficient.surface.chord is not None:
+        return _pressure_over_chord(coefficient, coefficient.surface, coefficient.surface.chord, reference)
+    figure = blank(7, 4.5)
+    axes = figure.subplots()
+    theta = np.mod(coefficient.theta, 360.0)
+    for side, label, style in (
+        (theta <= 180, "upper side", "C0-"),
+        ((theta >= 180) | (theta == 0), "lower side", "C1--"),
+    ):
+        folded = np.where(theta <= 180, theta, 360 - theta)[side]
+        order = np.argsort(folded)
+        angle, mean, deviation = (a[order] for a in (folded, coefficient.mean[side], coefficient.deviation[side]))
+        axes.plot(angle, mean, style, label=label)
+        axes.fill_between(angle, mean - deviation, mean + deviation, color=style[:2], alpha=0.15, lw=0)
+    if reference is not None:
+        axes.plot(*reference, "k:", lw=1.5, label="reference")
+    axes.set(xlabel=r"$\theta$ from the front stagnation point [degrees]", ylabel="$C_p$", xlim=(0, 180))
+    axes.set_title(_samples(coefficient), fontsize="medium")
+    axes.set_xticks(range(0, 181, 30))
+    _finish_pressure(axes, coefficient)
+    return figure
+
+
+def _pressure_over_chord(
+    coefficient: PressureCoefficient,
+    surface: Surface,
+    chord: FloatArray,
+    reference: tuple[FloatArray, FloatArray] | None,
+) -> Figure:
+    figure = blank(10, 4.5)
+    left, right = figure.subplots(1, 2, sharey=True)
+    several = surface.part.max() > 0
+    for part in np.unique(surface.part):
+        for index, (side, name, line) in enumerate(((1, "upper side", "-"), (-1, "lower side", "--"))):
+            chosen = (surface.part == part) & (surface.side == side)
+            mean, deviation = coefficient.mean[chosen], coefficient.deviation[chosen]
+            colour = f"C{int(part) % 10}" if several else f"C{index}"
+            for axes, abscissa in ((left, chord), (right, surface.arc)):
+                axes.plot(abscissa[chosen], mean, line, color=colour, label=f"{part:.0f}, {name}" if several else name)
+                axes.fill_between(abscissa[chosen], mean - deviation, mean + deviation, color=colour, alpha=0.15, lw=0)
+    if reference is not None:
+        left.plot(*reference, "k:", lw=1.5, label="reference")
+    left.set(xlabel="$x/c$", ylabel="$C_p$, suction up")
+    right.set(xlabel="distance along the surface from the leading edge, $s/D$")
+    left.invert_yaxis()  # of both
+    figure.suptitle(_samples(coefficient), fontsize="medium")
+    for axes in (left, right):
+        _finish_pressure(axes, coefficient)
+    return figure
+
+
+def _samples(coefficient: PressureCoefficient) -> str:
+    still = f", {DEVELOPING}" if coefficient.developing else ""
+    return f"mean of {coefficient.samples} samples{still}, band: ± 1 standard deviation"
+
+
+def _finish_pressure(axes: Axes, coefficient: PressureCoefficient) -> None:
+    if coefficient.samples == 0:
+        axes.text(0.5, 0.5, "no samples in the averaging window", ha="center", transform=axes.transAxes)
+    axes.grid(alpha=0.3)
+    axes.legend()
+
+
+def profile(curves: dict[str, Profile]) -> Figure:
+    """Draw computed curves, and the reference curve where it is known.
+
+    Parameters
+    ----------
+    curves : dict
+        The same profile of one run or several, by name; the last one's reference is drawn.
+    """
+    figure = blank(7, 4.5)
+    axes = figure.subplots()
+    for name, curve in curves.items():
+        axes.plot(*curve.computed, lw=1.2, label=name)
+    if curve.reference[0].size:
+        axes.plot(*curve.reference, "k:", lw=1.5, label=f"reference: {curve.source}")
+    axes.set(xlabel=curve.axes[0], ylabel=curve.axes[1])
+    axes.set_title(curve.name, fontsize="medium")
+    axes.grid(alpha=0.3)
+    axes.legend()
+    return figure
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A series of points to draw.
+
+    Attributes
+    ----------
+    label : str
+        Its name in the legend.
+    x, y : list of float
+    uncertainty : list of float
+        Half lengths of the error bars; none are drawn if empty or zero.
+    style : str
+        Matplotlib's format; the next colour and marker if empty.
+    """
+
+    label: str
+    x: list[float]
+    y: list[float]
+    uncertainty: list[float] = dataclass_field(default_factory=list)
+    style: str = ""
+
+
+def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str] = ()) -> Figure:
+    """Curves over a common abscissa, one panel for each ordinate, three in a row.
+
+    Parameters
+    ----------
+    panels : dict
+        The curves of each panel by the label of its ordinate.
+    label : str
+        Label of the abscissa.
+    logarithmic : sequence of {"x", "y"}
+        Logarithmic axes.
+    """
+    columns = min(len(panels), 3)
+    rows = -(-len(panels) // columns)
+    figure = blank(6.5 * columns, 4.5 * rows)
+    grid = figure.subplots(rows, columns, squeeze=False).flat
+    for axes, (name, curves) in zip(grid, panels.items(), strict=False):
+        for index, curve in enumerate(curves):
+            style = curve.style or f"C{index}{'osD^v<>pPX'[index % 10]}-"
+            axes.plot(curve.x, curve.y, style, ms=5, lw=1, label=curve.label)
+            if np.nansum(curve.uncertainty) > 0:
+                axes.errorbar(curve.x, curve.y, curve.uncertainty, fmt="none", ecolor=style[:2], capsize=2, lw=1)
+        if "x" in logarithmic:
+            axes.set_xscale("log")
+            ticks = sorted({x for curve in curves for x in curve.x})
+            axes.set_xticks(ticks, [f"{x:.3g}" for x in ticks])
+            axes.xaxis.minorticks_off()
+        if "y" in logarithmic:
+            axes.set_yscale("log")
+        axes.set(xlabel=label, ylabel=name)
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize="small")
+    for axes in list(figure.axes)[len(panels) :]:
+        axes.remove()
+    return figure
+
+
+def convergence(errors: dict[str, dict[int, float]]) -> Figure:
+    """Draw the moduli of errors over the resolution, and lines of first and second order.
+
+    Parameters
+    ----------
+    errors : dict
+        The errors of each quantity by resolution D/Δx.
+    """
+    figure = blank(7, 4.5)
+    axes = figure.subplots()
+    for name, series in errors.items():
+        axes.loglog([*series], np.abs([*series.values()]), "o-", label=name)
+    resolutions = sorted({resolution for series in errors.values() for resolution in series})
+    largest = max(abs(error) for series in errors.values() for error in series.values())
+    for order, style in ((1, "k:"), (2, "k--")):
+        slope = [largest * (resolutions[0] / resolution) ** order for resolution in resolutions]
+        axes.loglog(resolutions, slope, style, lw=0.8, label=f"order {order}")
+    axes.set(xlabel=r"resolution $D/\Delta x$", ylabel="|error|")
+    axes.set_xticks(resolutions, [str(resolution) for resolution in resolutions])
+    axes.xaxis.minorticks_off()
+    axes.grid(alpha=0.3, which="both")
+    figure.legend(loc="outside lower center", ncols=2, fontsize="small", frameon=False)
+    return figure

@@ -1,0 +1,141 @@
+"""Figures of a run over time, and its spectra."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alsph.analysis import averages
+from alsph.analysis.averages import Window
+from alsph.analysis.window import DEVELOPING
+from alsph.arrays import FloatArray
+from alsph.plotting.style import TIME_LABEL, blank
+from alsph.results.ledger import Ledger
+from alsph.results.run import Run
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def forces(run: Run, body: str | None = None) -> Figure:
+    """Drag and lift coefficients over time with their parts, the averaging window shaded and the means drawn."""
+    figure = blank(9, 6)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    time = run.history["time"]
+    for axes, axis, symbol in ((upper, "x", "C_D"), (lower, "y", "C_L")):
+        parts = {part: run.coefficient(axis, part, body) for part in ("viscous", "pressure", "total")}
+        for (part, values), colour in zip(parts.items(), ("C2", "C1", "C0"), strict=True):
+            axes.plot(time, values, colour, lw=1, label=part)
+        _robust_limits(axes, time, np.stack(list(parts.values())))
+        axes.set_ylabel(f"${symbol}$")
+        _finish(axes, run.window, legend=axes is upper)
+    if run.window.edges.size and run.bodies:
+        drag, lift = run.load("x", body), run.load("y", body)
+        span = [run.window.start, run.window.end]
+        upper.plot(span, [drag.mean] * 2, "k--", lw=1)
+        upper.set_title(f"mean $C_D$ = {drag.mean}", loc="left", fontsize="medium")
+        strouhal = ",  no shedding found" if np.isnan(run.strouhal) else f",  Sr = {run.strouhal}"
+        lower.set_title(f"rms $C_L$ = {lift.rms}{strouhal}", loc="left", fontsize="medium")
+    lower.set_xlabel(TIME_LABEL)
+    return figure
+
+
+def spectrum(runs: dict[str, Run], body: str | None = None) -> Figure:
+    """Amplitudes of the spectral lines of drag and lift in the averaging window.
+
+    Parameters
+    ----------
+    runs : dict
+        Runs by the name they have in the figure.
+    body : str, optional
+        Name of the body; the only one if None.
+    """
+    figure = blank(9, 6)
+    grid = figure.subplots(2, 1, sharex=True)
+    for axes, axis, symbol in zip(grid, "xy", ("C_D", "C_L"), strict=True):
+        for name, run in runs.items():
+            time, window, coefficient = run.history["time"], run.window, run.coefficient(axis, body=body)
+            if window.edges.size:
+                lines = averages.amplitude_spectrum(time, coefficient, window.start, window.end)
+                label = f"{name}, {DEVELOPING}" if window.developing else name
+                axes.loglog(*(a[1:] for a in lines), lw=0.8, label=label)
+        axes.set_ylabel(f"amplitude of ${symbol}$")
+        axes.grid(alpha=0.3)
+        if axes.lines:
+            axes.legend()
+    grid[-1].set_xlabel("$fD/U$")
+    return figure
+
+
+def _finish(axes: Axes, window: Window, *, legend: bool = True) -> None:
+    """Shade the averaging window, and put the legend above the panel, where it hides nothing."""
+    if window.edges.size:
+        label = f"averaged ({window.periods} periods)" if window.periods else "averaged"
+        label += f", {DEVELOPING}" if window.developing else ""
+        axes.axvspan(window.start, window.end, color="0.92", zorder=0, label=label)
+    axes.grid(alpha=0.3)
+    if legend and axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=5, frameon=False, fontsize="small", borderpad=0)
+
+
+def _robust_limits(axes: Axes, time: FloatArray, values: FloatArray) -> None:
+    """Scale the ordinate to the record without its start, where an impulsive start's forces tower over all else."""
+    if len(time) < 10:
+        return
+    late = values[:, time > time[0] + 0.1 * (time[-1] - time[0])]
+    late = late[np.isfinite(late)]
+    if late.size and np.ptp(late) > 0:
+        margin = 0.15 * np.ptp(late)
+        axes.set_ylim(late.min() - margin, late.max() + 2 * margin)
+
+
+def ledger(run: Run) -> Figure:
+    """Divergence and the solver's effort on the left; volume, mass and kinetic energy with its budget on the right."""
+    ledger, history = run.ledger, run.history
+    empty = np.empty(0)
+    fluid, mass = history.get("fluid", empty), history.get("mass_in", empty) - history.get("mass_out", empty)
+    panels: list[tuple[str, dict[str, FloatArray]]] = [
+        (r"$|\nabla\cdot\mathbf{u}|\,D/U$", {"largest": ledger.divergence_max, "mean": ledger.divergence_mean}),
+        ("relative change", {"volume": ledger.volume_drift, "volume over exact": ledger.volume_error}),
+        ("iterations", {"inner iterations of a step": ledger.iterations}),
+        (
+            "relative change",
+            {"fluid particles": fluid / fluid[:1] - 1, "mass in - out": mass / history.get("volume", empty)[:1]},
+        ),
+        (r"$\Delta tU/\Delta x$", {"time step": history.get("time_step", empty) / run.spacing}),
+        (r"$E\,/\,\rho U^2D^d$", {"kinetic energy": ledger.kinetic_energy}),
+        ("$u_{max}/U$", {"largest velocity": history.get("velocity_max", empty)}),
+        (r"$\dot E\,/\,\rho U^3D^{d-1}$", {}),
+    ]
+    figure = blank(12, 8.5)
+    grid = figure.subplots(4, 2, sharex=True)
+    for axes, (label, curves) in zip(grid.flat, panels, strict=True):
+        for name, values in curves.items():
+            axes.plot(run.history["time"], values, lw=0.8, label=name)
+        axes.set_ylabel(label)
+        if not curves:
+            _energy_budget(axes, run.ledger)
+        elif "nabla" in label:
+            axes.set_yscale("log")
+        elif "change" not in label:
+            axes.set_ylim(0, 1.1 * axes.dataLim.ymax if run.history["time"].size else None)
+        _finish(axes, run.window)
+    for axes in grid[-1]:
+        axes.set_xlabel(TIME_LABEL)
+    return figure
+
+
+def _energy_budget(axes: Axes, ledger: Ledger) -> None:
+    """Rate of change of the kinetic energy, and at the snapshots what it is made of."""
+    if not np.isfinite(ledger.dissipation).any():
+        axes.text(0.5, 0.5, "no budget: energy enters or leaves with the fluid", ha="center", transform=axes.transAxes)
+        return
+    axes.plot(ledger.time, ledger.energy_rate, lw=0.8, label="dE/dt")
+    for label, values, style in (
+        ("- dissipation", -ledger.dissipation, "v"),
+        ("power", ledger.power, "^"),
+        ("imbalance", ledger.imbalance, "kx"),
+    ):
+        axes.plot(ledger.snapshot_time, values, style, ms=4, label=label)

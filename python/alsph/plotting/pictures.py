@@ -1,0 +1,205 @@
+"""Pictures of the particles' fields."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alsph.analysis import sampling
+from alsph.arrays import FloatArray
+from alsph.errors import ConfigError
+from alsph.geometry.particles import Kind, Snapshot
+from alsph.parameters import suggest
+from alsph.plotting.style import TIME_LABEL, blank
+from alsph.text import shown
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+PIXELS_PER_SPACING = 2
+
+LARGEST_VIEW = 20_000  # spacings that a picture is wide or high at most
+
+
+@dataclass(frozen=True)
+class FieldStyle:
+    """How a field is drawn: label with its unit, colour map, and whether the scale is symmetric about zero."""
+
+    label: str
+    colours: str
+    signed: bool
+
+
+FIELDS = {
+    "vorticity": FieldStyle(r"vorticity $\omega D/U$", "RdBu_r", True),
+    "pressure": FieldStyle(r"pressure $p\,/\,\rho U^2$", "RdBu_r", True),
+    "velocity": FieldStyle(r"velocity $|\mathbf{u}|/U$", "viridis", False),
+    "velocity_divergence": FieldStyle(r"velocity divergence $\nabla\cdot\mathbf{u}\,D/U$", "PuOr_r", True),
+}
+
+
+def field_style(name: str) -> FieldStyle:
+    """Return how a field is drawn.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such field.
+    """
+    if name not in FIELDS:
+        raise ConfigError(f"unknown field '{name}'; {suggest(name, FIELDS)}")
+    return FIELDS[name]
+
+
+def field(
+    snapshot: Snapshot,
+    name: str,
+    spacing: float,
+    *,
+    limit: float | None = None,
+    view: tuple[float, float, float, float] | None = None,
+) -> Figure:
+    """Picture of a field in 2-D, the bodies in grey.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+    name : {"vorticity", "pressure", "velocity", "velocity_divergence"}
+    spacing : float
+        Particle spacing Δx [D].
+    limit : float, optional
+        End of the colour scale; from the data if None.
+    view : (left, right, bottom, top), optional
+        Part of the plane to show [D]; all of it if None.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such field, or the snapshot is in 3-D.
+    """
+    field_style(name)
+    left, right, bottom, top = extent = _extent(snapshot, spacing, view)
+    width = 9.0
+    figure = blank(width, max(2.5, 0.81 * width * (top - bottom) / (right - left) + 0.75), "compressed")
+    axes = figure.subplots()
+    _draw_field(axes, snapshot, name, spacing, extent, limit)
+    axes.set(title=f"{TIME_LABEL} = {snapshot.time:.2f}")
+    return figure
+
+
+def fields(
+    snapshots: dict[str, tuple[Snapshot, float]],
+    names: Sequence[str],
+    view: Sequence[float] | None = None,
+) -> Figure:
+    """Pictures of several fields in 2-D, one row for each snapshot and one column for each field.
+
+    Parameters
+    ----------
+    snapshots : dict
+        Snapshot and particle spacing Δx [D] by the title of the row.
+    names : sequence of str
+        Names of the fields; the colour scale of a field is that of its first row.
+    view : (left, right, bottom, top), optional
+        Part of the plane to show [D]; all of it if None.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such field, or a snapshot is in 3-D.
+    """
+    (first, spacing), *_ = snapshots.values()
+    left, right, bottom, top = extent = _extent(first, spacing, view)
+    width = 6.5
+    height = 0.85 * width * (top - bottom) / (right - left) + 0.6
+    figure = blank(width * len(names), height * len(snapshots))
+    grid = figure.subplots(len(snapshots), len(names), squeeze=False)
+    for column, name in zip(grid.T, names, strict=True):
+        limit: float | None = None
+        for axes, (title, (snapshot, spacing)) in zip(column, snapshots.items(), strict=True):
+            limit = _draw_field(axes, snapshot, name, spacing, extent, limit)
+            axes.set_title(f"{title}, {TIME_LABEL} = {snapshot.time:.2f}", fontsize="medium")
+    return figure
+
+
+def _draw_field(
+    axes: Axes,
+    snapshot: Snapshot,
+    name: str,
+    spacing: float,
+    extent: tuple[float, float, float, float],
+    limit: float | None,
+) -> float:
+    """Draw a field with its colour bar; return the end of the colour scale."""
+    style = field_style(name)
+    if limit is not None and not (isinstance(limit, int | float | np.number) and 0 < limit < np.inf):
+        raise ConfigError(f"limit = {shown(limit)}: must be a number above zero")
+    values = np.linalg.norm(snapshot.velocity, axis=1) if name == "velocity" else getattr(snapshot, name)
+    picture, body = _raster(snapshot, values, spacing, extent)
+    limit = limit or _limit(picture)
+    lowest = -limit if style.signed else 0.0
+    frame: dict[str, Any] = {"extent": extent, "origin": "lower"}
+    image = axes.imshow(picture, cmap=style.colours, vmin=lowest, vmax=limit, interpolation="bilinear", **frame)
+    if body.any():
+        axes.contourf(body, levels=[0.5, np.inf], colors=["0.35"], **frame)
+    axes.figure.colorbar(
+        image, ax=axes, label=style.label, extend="both" if style.signed else "max", pad=0.02, fraction=0.05
+    )
+    axes.set(xlabel="$x/D$", ylabel="$y/D$", aspect="equal")
+    return limit
+
+
+def _extent(snapshot: Snapshot, spacing: float, view: Sequence[float] | None) -> tuple[float, float, float, float]:
+    """Return left, right, bottom and top of the view; without one, of the fluid without inlet and outlet buffers."""
+    if snapshot.position.shape[1] != 2:
+        raise ConfigError("pictures are drawn in 2-D only; open particles.vtkhdf in ParaView")
+    if view is not None:
+        try:
+            left, right, bottom, top = map(float, view)
+        except (TypeError, ValueError):
+            left = right = bottom = top = np.nan
+        if not (0 < right - left < LARGEST_VIEW * spacing and 0 < top - bottom < LARGEST_VIEW * spacing):
+            raise ConfigError(f"view = {shown(view)}: needs left, right, bottom and top, in this order [D]")
+        return left, right, bottom, top
+    position = snapshot.position[snapshot.kind == Kind.FLUID]
+    bounds = np.array([position.min(axis=0) - spacing / 2, position.max(axis=0) + spacing / 2])
+    (left, bottom), (right, top) = np.round(bounds / spacing) * spacing
+    return float(left), float(right), float(bottom), float(top)
+
+
+def _raster(
+    snapshot: Snapshot, values: FloatArray, spacing: float, extent: tuple[float, float, float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the fluid's field (rows, columns), NaN where there is none, and the share of each pixel that is solid."""
+    left, right, bottom, top = extent
+    columns, rows = (max(2, round(PIXELS_PER_SPACING * length / spacing)) for length in (right - left, top - bottom))
+    x = left + (np.arange(columns) + 0.5) * (right - left) / columns
+    y = bottom + (np.arange(rows) + 0.5) * (top - bottom) / rows
+    points = np.stack([grid.ravel() for grid in np.meshgrid(x, y)], axis=1)
+    fluid = snapshot.fluid
+    picture = sampling.average(snapshot.position[fluid], values[fluid], points, spacing).reshape(rows, columns)
+    if fluid.all():
+        return picture, np.zeros_like(picture)
+    body = sampling.fill(snapshot.position[~fluid], points, spacing).reshape(rows, columns)
+    from scipy.ndimage import binary_fill_holes
+
+    hollow = binary_fill_holes(body > 0.5) & np.isnan(picture)
+    return picture, np.where(hollow, 1.0, body)
+
+
+def _limit(picture: FloatArray) -> float:
+    """Return a round end for the colour scale.
+
+    All but one per cent of the pixels stay within it, or more where the field is concentrated in fewer than that.
+    """
+    size = np.abs(picture[np.isfinite(picture)])
+    if not size.any():
+        return 1.0
+    largest = max(float(np.percentile(size, 99)), float((size**2).sum() / size.sum()))
+    unit = 10.0 ** np.floor(np.log10(largest))
+    return float(np.ceil(largest / unit * 2) / 2 * unit)

@@ -1,0 +1,61 @@
+"""Figures of a run, as pure functions: results in, :class:`matplotlib.figure.Figure` out, no global state."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from alsph.errors import ConfigError
+from alsph.folder.durable import check_target, replacing
+from alsph.parameters import suggest
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+TIME_LABEL = "$tU/D$"
+
+
+def blank(width: float, height: float, layout: Literal["constrained", "compressed"] = "constrained") -> Figure:
+    """Return an empty figure of a size in inches."""
+    from matplotlib.figure import Figure  # half a second that only pictures take
+
+    return Figure(figsize=(width, height), layout=layout)
+
+
+def save(figure: Figure, path: str | Path, **options: Any) -> None:
+    """Save a figure in a file; what was there is replaced, and nothing is written through a link.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : path
+        The file, whose suffix says the format: PNG if there is none.
+    **options
+        Of matplotlib's ``savefig``.
+
+    Raises
+    ------
+    ConfigError
+        If the format is unknown.
+    RunFolderError
+        If the file is a link or a special file.
+    """
+    path = Path(path)
+    path = path if path.suffix else path.with_suffix(".png")
+    known = figure.canvas.get_supported_filetypes()
+    if (kind := path.suffix[1:].lower()) not in known:
+        raise ConfigError(f"{path}: '{kind}' is no format of figures; {suggest(kind, known)}")
+    check_target(path)
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format=kind, **options)
+
+
+def remark(figure: Figure, text: str) -> None:
+    """Write a remark below a figure."""
+    if text:
+        width = int(figure.get_size_inches()[0] * 17)  # letters in a line
+        figure.supxlabel(
+            textwrap.fill(text, width), fontsize="x-small", color="0.3", x=0.01, ha="left", parse_math=False
+        )

@@ -1,0 +1,33 @@
+"""How a run ended, in words, as those of :mod:`alsph.cases.remarks`."""
+
+from alsph.analysis.record import Record
+
+DIVERGENCE = 0.02
+"""Mean |∇·u| [U/D] above which it is remarked upon; runs with the defaults have 1e-4 to 5e-3 (docs/results.md)."""
+
+FEW_PERIODS = 5
+
+
+def outcome(run: Record, until: float) -> list[str]:
+    """Remark on how a run that was to reach `until` [D/U] ended and on its statistics."""
+    time = run.history["time"]
+    found = []
+    if run.status != "finished":
+        reached = time[-1] if len(time) else 0.0
+        found.append(f"{run.status}: at tU/D = {reached:.4g} of {until:g}; results are those up to there")
+    if retries := run.info.get("retries"):
+        found.append(f"retried: broke down {len(retries)} times, went on with smaller time steps")
+    if run.divergence.mean > DIVERGENCE:
+        text = f"mean |∇·u| = {float(run.divergence.mean):.2g} U/D"
+        found.append(f"not divergence-free: {text}; more projection_sweeps or max_iterations lower it")
+    if run.body and run.window.edges.size:
+        rule = run.window.rule
+        if rule.startswith("still developing ("):
+            found.append(rule.replace(" (", ": ", 1).replace(")", "", 1))
+        elif run.window.periods and not run.window.settled:
+            found.append(f"not settled: {rule}")
+        elif 0 < run.window.periods < FEW_PERIODS:
+            found.append(f"few periods: averaged over {run.window.periods} of shedding; a longer run tells more")
+        if run.drag.mean < 0:
+            found.append(f"unphysical: mean drag coefficient {run.drag.mean}; a stream drags a body at rest along")
+    return found

@@ -1,0 +1,463 @@
+"""What a run folder tells: forces, Strouhal number, pressure coefficient, divergence, snapshots and figures."""
+
+from __future__ import annotations
+
+import html
+import shlex
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alsph.analysis import averages, sampling
+from alsph.analysis.averages import Estimate, Window
+from alsph.analysis.loads import Divergence, Load, PressureCoefficient
+from alsph.analysis.measures import Measure, Profile
+from alsph.arrays import AXES, FloatArray
+from alsph.cases import remarks
+from alsph.config import Config, of_run
+from alsph.errors import ConfigError, RunFolderError
+from alsph.folder import reading
+from alsph.folder.run_folder import RunFolder
+from alsph.geometry.particles import Snapshot
+from alsph.parameters import choose
+from alsph.results.ledger import Ledger
+from alsph.results.outcome import outcome
+from alsph.text import duration, in_figure, printable, shown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Run:
+    """The results in a run folder, finished or not, read when they are first asked for.
+
+    Lengths are in D, velocities in U and times in D/U. A run that is still going on is seen as it was when each part
+    was read; make a new ``Run`` to see more of it. Where the data are too few a number is NaN and its ``note`` says
+    why.
+
+    Parameters
+    ----------
+    path : path
+        The run folder.
+
+    Raises
+    ------
+    RunFolderError
+        If it is no run folder, or a file in it is unreadable when it is needed.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        if not self.path.is_dir():
+            raise RunFolderError(f"{self.path}: no such run folder")
+        self.case: dict[str, Any] = reading.case(self.path / "case.toml")
+        self.info: dict[str, Any] = reading.info(self.path / "run.json")
+        if self._goes_on() and RunFolder(self.path).is_busy() is False:
+            self.info = reading.info(self.path / "run.json")  # it may just have ended
+            if self._goes_on():
+                self.info |= {"status": "stopped", "message": self._how_to_go_on()}
+
+    def _goes_on(self) -> bool:
+        return self.info.get("status") in ("starting", "running")
+
+    def _how_to_go_on(self) -> str:
+        """Return what to say of a run that has neither ended nor a process at work in it."""
+        resumable = RunFolder(self.path).has_checkpoint()
+        command = f"alsph resume {shlex.quote(str(self.path))}" if resumable else "alsph run, with --force"
+        return f"no process is at work in it, it was killed or its machine went down; go on with: {command}"
+
+    @property
+    def status(self) -> str:
+        """How far the run is.
+
+        ``running`` (``starting`` before its first step), ``finished``, ``interrupted``, ``diverged``, ``failed``, or
+        ``stopped``: killed, with no process at work in it.
+        """
+        return str(self.info.get("status", "unknown"))
+
+    @property
+    def spacing(self) -> float:
+        """Particle spacing Δx [D]."""
+        return 1.0 / float(self.case["resolution"])
+
+    @cached_property
+    def config(self) -> Config:
+        """The case and the settings of the run, as the objects that :attr:`case` was written from."""
+        return of_run(self.path)
+
+    @cached_property
+    def measures(self) -> list[Measure]:
+        """What the run is judged by: numbers beside their reference values."""
+        return self.config.case.measures(self)
+
+    @cached_property
+    def profiles(self) -> list[Profile]:
+        """Curves of the run beside their reference curves."""
+        return self.config.case.profiles(self)
+
+    @cached_property
+    def ledger(self) -> Ledger:
+        """How incompressible the flow stayed, and where its kinetic energy went."""
+        return Ledger.of(self, self.config.case)
+
+    @cached_property
+    def history(self) -> dict[str, FloatArray]:
+        """Columns of ``history.csv``, one entry a step; only an empty ``time`` before the first step."""
+        return reading.history(self.path / "history.csv")
+
+    @property
+    def bodies(self) -> list[str]:
+        """Names of the bodies that forces were recorded for."""
+        suffix = "_pressure_force_x"
+        return [name.removesuffix(suffix) for name in self.history if name.endswith(suffix)]
+
+    @property
+    def body(self) -> str | None:
+        """Name of the body in the flow that drag and lift are those of, or names of several; None between walls."""
+        return ", ".join(self.config.case.coefficient_bodies) or None
+
+    def _chosen(self, body: str | None, part: str) -> tuple[list[str], tuple[str, ...]]:
+        """Return the bodies and the parts that a load is the sum of."""
+        choose("part", part, ("total", "pressure", "viscous"))
+        if body is not None:
+            choose("body", body, self.bodies or [known["name"] for known in self.config.case.bodies()])
+        names = [body] if body else self.config.case.coefficient_bodies or self.bodies[:1]
+        return names, ("pressure", "viscous") if part == "total" else (part,)
+
+    def coefficient(self, axis: str, part: str = "total", body: str | None = None) -> FloatArray:
+        """Force coefficient in every step, F / (½ρU²D).
+
+        Parameters
+        ----------
+        axis : {"x", "y", "z"}
+            Direction of the force; drag is ``x`` and lift ``y``.
+        part : {"total", "pressure", "viscous"}
+        body : str, optional
+            Name of the body; if None those of :attr:`body` together, or the first one between walls.
+
+        Returns
+        -------
+        ndarray, shape (steps,)
+            NaN if the run has no body.
+
+        Raises
+        ------
+        ConfigError
+            If there is no such direction, part or body.
+        """
+        axes = [name for name in AXES if name != "z" or self.config.case.space_dimensions == 3]
+        if axis not in axes:
+            raise ConfigError(f"axis = {shown(axis)}: unknown; known: {', '.join(axes)}; the drag is x and the lift y")
+        names, parts = self._chosen(body, part)
+        columns = [self.history.get(f"{name}_{each}_force_{axis}") for each in parts for name in names or [""]]
+        missing = np.full(len(self.history["time"]), np.nan)
+        return 2.0 * sum((missing if column is None else column for column in columns), np.zeros_like(missing))
+
+    @cached_property
+    def window(self) -> Window:
+        """Averaging window, found from the lift and the drag (see :func:`alsph.analysis.averages.averaging_window`)."""
+        time = self.history["time"]
+        missing = np.full(len(time), np.nan)
+        drag, lift = (self.coefficient(axis) for axis in "xy") if self.body else (missing, missing)
+        return averages.averaging_window(time, drag, lift, self.config.case.thickness if self.body else 1.0)
+
+    @cached_property
+    def drag(self) -> Load:
+        """Drag coefficient of the body, of all bodies together if there are several."""
+        return self.load("x")
+
+    @cached_property
+    def lift(self) -> Load:
+        """Lift coefficient of the body, of all bodies together if there are several."""
+        return self.load("y")
+
+    def load(self, axis: str, body: str | None = None) -> Load:
+        """Force coefficient of a body along an axis over the averaging window (arguments as in :meth:`coefficient`)."""
+        return self._load(*(self.coefficient(axis, part, body) for part in ("total", "pressure", "viscous")))
+
+    def _load(self, total: FloatArray, pressure: FloatArray, viscous: FloatArray) -> Load:
+        return Load(
+            mean=self._measure(averages.mean, total),
+            rms=self._measure(averages.root_mean_square, total),
+            amplitude=self._measure(averages.amplitude, total),
+            pressure=self._measure(averages.mean, pressure),
+            viscous=self._measure(averages.mean, viscous),
+        )
+
+    def moment_coefficient(
+        self, part: str = "total", body: str | None = None, about: Sequence[float] | None = None
+    ) -> FloatArray:
+        """Pitching moment coefficient of a body in every step, M / (½ρU²c²), nose up positive, in 2-D.
+
+        The flow comes from the left, so that nose up is clockwise. c is the case's :attr:`~alsph.cases.Case.chord`.
+
+        Parameters
+        ----------
+        part : {"total", "pressure", "viscous"}
+        body : str, optional
+            Name of the body; all of those that drag and lift are of, if None.
+        about : (x, y), optional
+            Point that the moment is about [D]; if None, that of the case: a quarter of the chord behind the leading
+            edge of a ``body``, the centre of a cylinder.
+
+        Returns
+        -------
+        ndarray, shape (steps,)
+            NaN if the run has no body.
+
+        Raises
+        ------
+        ConfigError
+            If there is no such part or body, or `about` is no point.
+        """
+        case = self.config.case
+        names, parts = self._chosen(body, part)
+        point = case.moment_point if about is None else _point("about", about)
+        centres = {each["name"]: each["center"] for each in case.bodies()}
+        missing = np.full(len(self.history["time"]), np.nan)
+        moment = np.zeros_like(missing)
+        for name in names:
+            for each in parts:
+                moment += 2.0 * self.history.get(f"{name}_{each}_torque", missing)
+            arm = np.subtract(centres.get(name, np.nan), point)
+            moment += arm[0] * self.coefficient("y", part, name) - arm[1] * self.coefficient("x", part, name)
+        return -moment / case.chord**2
+
+    def moment(self, about: Sequence[float] | None = None, body: str | None = None) -> Load:
+        """Pitching moment coefficient over the averaging window (arguments as in :meth:`moment_coefficient`)."""
+        return self._load(*(self.moment_coefficient(part, body, about) for part in ("total", "pressure", "viscous")))
+
+    @cached_property
+    def strouhal(self) -> Estimate:
+        """Strouhal number fD/U of the lift."""
+        return self._measure(averages.strouhal, self.coefficient("y"))
+
+    @cached_property
+    def divergence(self) -> Divergence:
+        """Velocity divergence over the averaging window."""
+        columns = (self.history.get(f"divergence_{name}", np.empty(0)) for name in ("mean", "sum", "max"))
+        return Divergence(*(self._measure(averages.mean, column) for column in columns))
+
+    @cached_property
+    def pressure_coefficient(self) -> PressureCoefficient:
+        """Mean pressure coefficient (22) on the surface."""
+        angle, time, samples = reading.surface(self.path / "surface.h5")
+        mean, deviation = averages.mean_profile(time, samples, self.window)
+        inside = np.count_nonzero((time >= self.window.start) & (time <= self.window.end))
+        surface = reading.surface_points(self.path / "surface.h5")
+        if surface is None:  # of an older version, be it at the same points
+            case = self.config.case.surface_points()
+            surface = case if case and np.array_equal(case.angle, angle) else None
+        return PressureCoefficient(angle, mean, deviation, int(inside), self.window.developing, surface)
+
+    def _measure(self, measure: Callable[[FloatArray, FloatArray, Window], Estimate], values: FloatArray) -> Estimate:
+        if np.isnan(values).all():
+            return Estimate(np.nan, note="no steps recorded yet" if len(values) == 0 else "no body to measure")
+        return measure(self.history["time"], values, self.window)
+
+    @cached_property
+    def times(self) -> FloatArray:
+        """Times tU/D of the snapshots, shape (k,)."""
+        return reading.snapshot_times(self.path / "particles.vtkhdf")
+
+    def snapshot(self, time: float | None = None) -> Snapshot:
+        """Particles of the snapshot nearest to a time tU/D, the last one if None.
+
+        Raises
+        ------
+        ConfigError
+            If the time is no finite number.
+        RunFolderError
+            If there is no complete snapshot.
+        """
+        if time is not None and not (isinstance(time, int | float | np.number) and np.isfinite(time)):
+            raise ConfigError(f"time = {shown(time)}: must be a finite number")
+        if len(self.times) == 0:
+            raise RunFolderError(f"{self.path}: no snapshot yet; wait for the first one or lower output_interval")
+        index = len(self.times) - 1 if time is None else int(np.abs(self.times - time).argmin())
+        return reading.snapshot(self.path / "particles.vtkhdf", index)
+
+    def momentum_balance(self, lower: tuple[float, ...], upper: tuple[float, ...]) -> FloatArray:
+        """Mean force coefficients from the momentum balance of a box around the body: a check of the recorded loads.
+
+        Parameters
+        ----------
+        lower, upper : tuple of float
+            Corners of the box [D]; its faces must lie in the fluid.
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            Averaged over the snapshots in the averaging window; NaN if there are fewer than two.
+        """
+        times = self.times[(self.times >= self.window.start) & (self.times <= self.window.end)]
+        box = np.array(lower, dtype=float), np.array(upper, dtype=float)
+        dimensions = self.config.case.space_dimensions
+        if not box[0].shape == box[1].shape == (dimensions,) or not np.all(box[0] < box[1]):
+            raise ConfigError(
+                f"box from {shown(lower)} to {shown(upper)}: needs corners of {dimensions} numbers, the lower one first"
+            )
+        if len(times) < 2:
+            return np.full(len(lower), np.nan)
+        balances = [self._box_balance(self.snapshot(time), box) for time in times]
+        surface, momentum = (np.array(values) for values in zip(*balances, strict=True))
+        mean = averages.batch_means(times, surface, times[[0, -1]])[0]
+        return np.asarray(2.0 * (mean - (momentum[-1] - momentum[0]) / (times[-1] - times[0])))
+
+    def _box_balance(self, snapshot: Snapshot, box: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
+        fluid = snapshot.fluid
+        viscosity = self.config.case.kinematic_viscosity
+        fields = snapshot.position[fluid], snapshot.velocity[fluid], snapshot.pressure[fluid]
+        return sampling.control_volume(*fields, box, self.spacing, 1.0, viscosity)
+
+    @cached_property
+    def remarks(self) -> list[str]:
+        """What is to be borne in mind with the results, each as ``keyword: what it is; what explains it``.
+
+        What resolution, method and domain cannot carry (:meth:`alsph.cases.Case.remarks`), and what came of the run.
+        """
+        return [*outcome(self, self.config.until), *self.config.case.remarks()]
+
+    def summary(self) -> dict[str, Any]:
+        """Return the run's main results by name, its measures each followed by the reference value where there is one.
+
+        ``str()`` of each value is fit to be read.
+        """
+        steps = len(self.history["time"])
+        results: dict[str, Any] = {
+            "case": self.config.case.name,
+            "Reynolds number": Estimate(self.case["reynolds"]),
+            "resolution, D/Δx": self.case["resolution"],
+            "status": self.status,
+            "message": self.info.get("message", ""),
+            "computing time": duration(self.info.get("seconds", 0)),
+            "time reached, tU/D": Estimate(self.history["time"][-1] if steps else 0.0),
+            "steps": steps,
+            "iterations of a step": self._iterations(),
+            "averaged from tU/D": Estimate(self.window.start),
+            "averaged to tU/D": Estimate(self.window.end),
+            "averaging rule": self.window.rule,
+        }
+        if self.body:
+            results["shedding periods"] = self.window.periods
+        results["mean velocity divergence, |∇·u| D/U"] = self.divergence.mean
+        results["largest velocity divergence, |∇·u| D/U"] = self.divergence.max
+        results["artificial Mach number of the penalty"] = Estimate(self._mach_number())
+        for measure in self.measures:
+            value = measure.value
+            results[measure.name] = value if isinstance(value, Estimate) else Estimate(value)
+            if np.abs(measure.reference) > 0:
+                results[f"{measure.name}, reference"] = Estimate(measure.reference)
+        results |= {f"remark {number}": remark for number, remark in enumerate(self.remarks, 1)}
+        return {name: value for name, value in results.items() if value != ""}
+
+    def _mach_number(self) -> float:
+        """u_max over the penalty's speed of sound c = √(r_AL/Δt), averaged over the run."""
+        names = ("velocity_max", "time_step", "penalty_coefficient")
+        if not all(name in self.history for name in names):
+            return np.nan
+        fastest, step, penalty = (self.history[name] for name in names)
+        moving = penalty > 0
+        return float(np.mean(fastest[moving] * np.sqrt(step[moving] / penalty[moving]))) if moving.any() else np.nan
+
+    def _iterations(self) -> str:
+        """How many iterations a step took, and how many it may take, in words."""
+        case, iterations = self.config.case, self.history.get("iterations", np.empty(0))
+        taken = f"{iterations.mean():.3g} of at most " if iterations.size else "at most "
+        return f"{taken}{case.max_iterations}, then {case.projection_sweeps} projection sweeps"
+
+    def plot_forces(self, path: str | Path | None = None, body: str | None = None) -> Figure:
+        """Figure of drag and lift over time with their parts and the averaging window; saved if `path` is given."""
+        return self._saved(_plotting().forces(self, body), path)
+
+    def plot_spectrum(self, path: str | Path | None = None, body: str | None = None) -> Figure:
+        """Figure of the spectra of drag and lift in the averaging window; saved if `path` is given."""
+        return self._saved(_plotting().spectrum({in_figure(self.path.name): self}, body), path)
+
+    def plot_field(
+        self,
+        name: str,
+        time: float | None = None,
+        path: str | Path | None = None,
+        *,
+        limit: float | None = None,
+        view: tuple[float, float, float, float] | None = None,
+    ) -> Figure:
+        """Picture of a field; saved if `path` is given.
+
+        Parameters
+        ----------
+        name : {"vorticity", "pressure", "velocity", "velocity_divergence"}
+        time : float, optional
+            Time tU/D; the nearest snapshot is shown, the last one if None.
+        path : path, optional
+            File to save the figure in.
+        limit : float, optional
+            End of the colour scale; from the data if None.
+        view : (left, right, bottom, top), optional
+            Part of the plane to show [D]; all of it if None.
+        """
+        _plotting().field_style(name)
+        return self._saved(_plotting().field(self.snapshot(time), name, self.spacing, limit=limit, view=view), path)
+
+    def plot_pressure_coefficient(
+        self, path: str | Path | None = None, reference: tuple[FloatArray, FloatArray] | None = None
+    ) -> Figure:
+        """Figure of C_p and a reference curve (θ in degrees, or x/c, and C_p); saved if `path` is given.
+
+        Without a `reference`, that of :attr:`profiles` is drawn where there is one.
+        """
+        if reference is None:
+            known = (profile.reference for profile in self.profiles if profile.name == "pressure coefficient")
+            reference = next(known, None)
+        return self._saved(_plotting().pressure_coefficient(self.pressure_coefficient, reference), path)
+
+    def plot_profile(self, profile: Profile, path: str | Path | None = None) -> Figure:
+        """Figure of one of :attr:`profiles` beside its reference; saved if `path` is given."""
+        return self._saved(_plotting().profile({"computed": profile}), path)
+
+    def plot_ledger(self, path: str | Path | None = None) -> Figure:
+        """Figure of divergence, iterations, time step, volume, mass and energy over time; saved if `path` is given."""
+        return self._saved(_plotting().ledger(self), path)
+
+    def _saved(self, figure: Figure, path: str | Path | None) -> Figure:
+        try:
+            said = remarks.brief(self.remarks)
+        except RunFolderError:  # a field can be drawn all the same
+            said = "no remarks: case or history of the run cannot be read"
+        _plotting().remark(figure, said)
+        if path is not None:
+            _plotting().save(figure, path)
+        return figure
+
+    def __repr__(self) -> str:
+        """Name the folder, the case, the status and the time reached."""
+        time = self.history["time"]
+        reached = time[-1] if len(time) else 0.0
+        return printable(f"Run('{self.path}': {self.case.get('case', 'unknown')}, {self.status}, tU/D = {reached:.4g})")
+
+    def _repr_html_(self) -> str:
+        rows = ((html.escape(name), html.escape(printable(str(value)))) for name, value in self.summary().items())
+        return "<table>" + "".join(f"<tr><th>{name}</th><td>{value}</td></tr>" for name, value in rows) + "</table>"
+
+
+def _plotting() -> ModuleType:
+    """Return :mod:`alsph.plotting`, which draws runs: the door of the ``plot_`` methods."""
+    from alsph import plotting
+
+    return plotting
+
+
+def _point(name: str, value: Sequence[float]) -> FloatArray:
+    """Return a point (2,) that was given by its two coordinates."""
+    try:
+        point = np.array(value, float)
+    except (TypeError, ValueError):
+        point = np.empty(0)
+    if point.shape != (2,) or not np.isfinite(point).all():
+        raise ConfigError(f"{name} = {shown(value)}: must be two numbers, x and y [D]")
+    return point

@@ -1,0 +1,67 @@
+"""What a run will take, before it is started."""
+
+import time as clock
+
+import numpy as np
+
+from alsph.cases import Body
+from alsph.config import Config
+from alsph.engine.simulation import Simulation
+from alsph.geometry.particles import Kind
+from alsph.text import duration
+
+PROBE_SECONDS = 5.0
+
+
+def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
+    """Return particles, memory, time step limits, steps and estimated time of a run, in words.
+
+    Parameters
+    ----------
+    config
+        The case and the settings of its run.
+    probe
+        Take a few steps to estimate the time.
+
+    Raises
+    ------
+    ConfigError
+        If the particles would not fit into the memory that is free.
+    """
+    case = config.case
+    problem = case.build()
+    kinds = np.bincount(problem.state["kind"], minlength=len(Kind))
+    counts = ", ".join(f"{kinds[kind]:,} {kind.name.lower()}" for kind in Kind if kinds[kind])
+    limits = case.time_step_limits()
+    binding = min(limits, key=lambda name: limits[name])
+    step, constant = case.expected_time_step(), case.expected_penalty_constant()
+    steps = config.until / (step * case.particle_spacing)
+    lines = [
+        ("case", f"{case.name}: {case.title}"),
+        *((("outline", str(case.shape)),) if isinstance(case, Body) else ()),
+        ("Reynolds number", f"{case.reynolds:g}"),
+        ("resolution", f"D/Δx = {case.resolution}, Δx = {case.particle_spacing:.6g} D"),
+        ("particles", f"{kinds.sum():,}: {counts}"),
+        ("memory", f"about {np.ceil(case.memory() / 2**20):,.0f} MiB, beside Python's own"),
+        *((name, f"{value:.3g}") for name, value in case.scales().items()),
+        ("time step", f"ΔtU/Δx = {step:.4g}" + (" (adaptive)" if case.adaptive_time_step else "")),
+        ("penalty", f"C_BV = {constant:.3g}: artificial Mach number {constant**-0.5:.2g}"),
+    ]
+    for name, limit in limits.items():
+        if np.isfinite(limit):
+            text = f"ΔtU/Δx < {limit:.4g} at u_max = {case.velocity_max:g} U{' (binds)' if name == binding else ''}"
+            lines.append((f"{name.replace('_', ' ')} limit", text))
+    lines.append(("steps", f"about {steps:,.0f} to t* = {config.until:g}"))
+    if probe:
+        seconds = _seconds_per_step(case.restored(problem.state, config.run.threads))
+        lines.append(("estimated time", f"{duration(seconds * steps)} at {seconds:.3g} s a step"))
+    if warning := case.time_step_warning():
+        lines.append(("warning", warning))
+    return lines + [("remark", remark) for remark in case.remarks()]
+
+
+def _seconds_per_step(simulation: Simulation) -> float:
+    simulation.advance(1)  # the first step allocates
+    start = clock.perf_counter()
+    steps = simulation.advance(20, wall_seconds=PROBE_SECONDS)
+    return (clock.perf_counter() - start) / max(steps, 1)

@@ -1,0 +1,246 @@
+"""Convergence of a case: a ladder of resolutions, observed orders, Richardson values and grid convergence indices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alsph import plotting, study
+from alsph.analysis.averages import remark
+from alsph.config import Config
+from alsph.errors import ConfigError
+from alsph.folder.durable import write_text
+from alsph.plotting.curves import Curve
+from alsph.results.run import Run
+from alsph.study import Results, Study, Sweep
+from alsph.study.declaration import digest
+from alsph.tables import markdown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SAFETY = 1.25
+"""Factor of safety of the grid convergence index from three resolutions (Roache 1994)."""
+
+LARGEST_ORDER = 8.0
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """How a result depends on the particle spacing, from its values at the three finest resolutions.
+
+    Attributes
+    ----------
+    name : str
+        The result.
+    resolutions : tuple of float
+        D/Δx, increasing.
+    values : tuple of float
+        The result at each.
+    kind : str
+        ``monotonic``, ``oscillating`` or ``diverging``: how the last three follow each other.
+    order : float
+        Observed order p; NaN unless monotonic.
+    richardson : float
+        Value extrapolated to Δx = 0; NaN unless monotonic.
+    index : float
+        Grid convergence index of the finest resolution, 1.25 |e| / (r^p − 1) with the relative change e of the last
+        refinement by r; half the range over the finest value where the values oscillate; NaN where they diverge, and of
+        errors, whose reference is zero.
+    reference : float
+        Independent value, NaN where there is none.
+    """
+
+    name: str
+    resolutions: tuple[float, ...]
+    values: tuple[float, ...]
+    kind: str
+    order: float
+    richardson: float
+    index: float
+    reference: float = np.nan
+
+
+def grid_convergence(
+    name: str, resolutions: Sequence[float], values: Sequence[float], reference: float = np.nan
+) -> Convergence:
+    """Return the observed order, Richardson value and grid convergence index of a result.
+
+    Parameters
+    ----------
+    name
+        The result.
+    resolutions
+        At least three D/Δx, increasing; their ratios may differ.
+    values
+        The result at each.
+    reference
+        Independent value.
+
+    Notes
+    -----
+    The order p solves (φ₁ − φ₂)/(φ₂ − φ₃) = (r₁₂^p − 1) r₂₃^p / (r₂₃^p − 1) of f = φ + C Δx^p through the last three
+    values, from coarse (1) to fine (3): the procedure of Celik et al. (J. Fluids Eng. 130, 078001, 2008), section 2.
+    """
+    known = tuple(map(float, resolutions)), tuple(values)
+    if len(resolutions) < 3 or len(values) != len(resolutions):
+        raise ConfigError(f"{name}: needs values at three resolutions or more, and has {len(values)}")
+    (n1, n2, n3), (f1, f2, f3) = known[0][-3:], known[1][-3:]
+    if not n1 < n2 < n3:
+        raise ConfigError(f"{name}: resolutions must increase, and are {n1:g}, {n2:g}, {n3:g}")
+    coarse, fine = f2 - f1, f3 - f2
+    scale = np.nan if reference == 0 or f3 == 0 else abs(f3)
+    unknown = np.nan, np.nan
+    if fine == 0 or not np.isfinite([coarse, fine]).all():
+        return Convergence(name, *known, "diverging" if fine else "monotonic", *unknown, np.nan, reference)
+    ratio, r12, r23 = coarse / fine, n2 / n1, n3 / n2
+    if ratio < 0:
+        spread = np.ptp([f1, f2, f3]) / 2 / scale
+        return Convergence(name, *known, "oscillating", *unknown, float(spread), reference)
+
+    def mismatch(p: float) -> float:
+        return float((r12**p - 1) * r23**p / (r23**p - 1) - ratio)
+
+    if not mismatch(1e-3) < 0 < mismatch(LARGEST_ORDER):
+        kind = "diverging" if mismatch(1e-3) >= 0 else "monotonic"
+        return Convergence(name, *known, kind, *unknown, np.nan, reference)
+    from scipy.optimize import brentq  # takes 0.1 s to load
+
+    order = float(brentq(mismatch, 1e-3, LARGEST_ORDER))
+    richardson = f3 + fine / (r23**order - 1)
+    index = SAFETY * abs(fine) / scale / (r23**order - 1)
+    return Convergence(name, *known, "monotonic", order, float(richardson), float(index), reference)
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """Convergence of a case.
+
+    Attributes
+    ----------
+    path : Path
+        Folder of report and figure.
+    results : Results
+        The study of the resolutions.
+    convergences : list of Convergence
+        One for each measure of the case.
+    """
+
+    path: Path
+    results: Results
+    convergences: list[Convergence]
+
+    def __str__(self) -> str:
+        """Return the table."""
+        if not self.convergences:
+            return "nothing to judge: fewer than three runs have finished, or the case has no measures"
+        resolutions = self.convergences[0].resolutions
+        header = [
+            "quantity",
+            *(f"D/Δx = {n:g}" for n in resolutions),
+            "kind",
+            "order",
+            "Richardson",
+            "GCI",
+            "reference",
+        ]
+        rows = [
+            [
+                found.name,
+                *(f"{value:.5g}{remark(value)}" for value in found.values),
+                found.kind,
+                _shown(found.order, ".2f"),
+                _shown(found.richardson, ".5g"),
+                _shown(100 * found.index, ".2g", " %"),
+                _shown(found.reference, ".5g"),
+            ]
+            for found in self.convergences
+        ]
+        return markdown(header, rows)
+
+    def draw(self) -> Figure | None:
+        """Return a figure of each measure over the particle spacing, with Richardson and reference values."""
+        if not self.convergences:
+            return None
+        panels: dict[str, list[Curve]] = {}
+        for found in self.convergences:
+            spacing = [1 / n for n in found.resolutions]
+            curves = [Curve("alsph", spacing, list(found.values))]
+            if np.isfinite(found.richardson):
+                band = [abs(found.index * found.values[-1])]
+                curves.append(Curve("Richardson, ± GCI", [0.0], [found.richardson], band, style="C1s"))
+            if np.isfinite(found.reference) and found.reference:
+                curves.append(Curve("reference", [0.0, max(spacing)], [found.reference] * 2, style="k--"))
+            panels[found.name] = curves
+        return plotting.panels(panels, r"$\Delta x/D$")
+
+    def save(self) -> None:
+        """Write ``convergence.md`` and ``convergence.png``."""
+        picture = self.draw()
+        lines = ["# Convergence", str(self)]
+        lines += [f"D/Δx = {row['resolution']}: {row['remarks']}" for row in self.results.rows if "remarks" in row]
+        if picture:
+            plotting.save(picture, self.path / "convergence.png", dpi=120)
+            lines.append("![Each measure over the particle spacing](convergence.png)")
+        write_text(self.path / "convergence.md", "\n\n".join(lines) + "\n")
+
+
+def converge(
+    config: Config,
+    resolutions: Sequence[int],
+    output: str | Path = "runs/studies",
+    *,
+    progress: bool = True,
+    **where: Any,
+) -> Report:
+    """Run a case at a ladder of resolutions and judge the convergence of its measures.
+
+    Parameters
+    ----------
+    config
+        The case, whose own resolution does not count, and the settings of its runs.
+    resolutions
+        At least three D/Δx.
+    output
+        Folder for runs and results, as in :func:`alsph.study.run`; finished runs are used again.
+    progress
+        Report progress.
+    **where
+        Further arguments of :func:`alsph.study.run`: ``jobs``, ``threads``, ``scheduler``.
+
+    Raises
+    ------
+    ConfigError
+        If there are fewer than three resolutions, or the case cannot be made at one of them.
+    """
+    ladder = sorted(set(resolutions))
+    if len(ladder) < 3:
+        raise ConfigError(f"resolutions = {ladder}: convergence needs three or more")
+    declared = Study(
+        name=f"converge-{config.case.name}-{digest(config, 'resolution')[:6]}",
+        title=f"Convergence of {config.case.name}",
+        base=config.tables(),
+        sweep=Sweep(product={"resolution": ladder}),
+    )
+    results = study.run(declared, output, progress=progress, **where)
+    finished = [row for row in results.rows if row["status"] == "finished"]
+    measures = [
+        {measure.name: measure for measure in Run(results.path.parent / row["folder"]).measures} for row in finished
+    ]
+    sizes = [row["resolution"] for row in finished]
+    convergences = [
+        grid_convergence(name, sizes, [each[name].value for each in measures], measure.reference)
+        for name, measure in (measures[-1] if len(sizes) >= 3 else {}).items()
+        if all(name in each for each in measures)
+    ]
+    report = Report(results.path, results, convergences)
+    report.save()
+    return report
+
+
+def _shown(value: float, form: str, unit: str = "") -> str:
+    return "" if np.isnan(value) else f"{value:{form}}{unit}"
