@@ -1,7 +1,7 @@
 //! alsph: Augmented Lagrangian SPH for incompressible flow.
 //!
 //! The engine behind the Python package of the same name. A [`Simulation`] holds the particles and settings; a time step is
-//! `Simulation::step`, and the method's equations (8) to (13) are [`scheme::Alsph::iterate`]. Equation numbers are those of
+//! `Simulation::step`, and the method's equations (8) to (13) are [`scheme::Alsph`]. Equation numbers are those of
 //! Kolukisa, Ozbulut and Yildiz, Symmetry 2021, 13, 472.
 
 pub mod base;
@@ -9,6 +9,7 @@ pub mod boundary;
 pub mod breakdown;
 pub mod discretisation;
 pub mod faces;
+pub mod flow;
 pub mod frame;
 pub mod halo;
 mod interpolation;

@@ -1,7 +1,7 @@
 //! Force and torque of the fluid on each body.
 //!
 //! The pressure acts through Σ_s Σ_f V_s V_f (p_s + p_f) ∇_s W_sf over solid s and fluid f, p being what the velocity of the step had the
-//! gradient of ([`crate::scheme::Alsph::acting_pressure`]), and the viscous stress through the compact Laplacian of the same pairs. Both
+//! gradient of (the scheme's acting pressure), and the viscous stress through the compact Laplacian of the same pairs. Both
 //! are antisymmetric, so the solid's own pairs cancel and only fluid neighbours count. Their sum is the momentum that the fluid gives.
 //! The viscous pairs feel the slope of the velocity over the width of a kernel. Where
 //! the velocity's slope at the surface is known, the viscous part is its shear over the area of the surface, and the pressure part the rest.

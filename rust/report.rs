@@ -1,9 +1,10 @@
 //! Clock and report: what goes on through a restart, and what is recorded of a step.
 
 use crate::base::parallel;
+use crate::flow::Step;
 use crate::loads::Load;
 use crate::particles::{ParticleKind, Particles};
-use crate::scheme::{Outcome, Step};
+use crate::scheme::Outcome;
 use crate::settings::{Boundary, Settings};
 
 /// Counters that go on through a restart.
@@ -42,7 +43,7 @@ pub struct Report<const D: usize> {
 
 impl<const D: usize> Report<D> {
     /// The report of a step whose iteration has ended and whose particles have not yet been shifted; clock, counts and outcome come after.
-    pub fn new(step: Step, particles: &Particles<D>, volume: &[f64], velocity_max: f64, loads: Vec<Load<D>>) -> Self {
+    pub fn new(step: Step, particles: &Particles<D>, volume: &[f64], penalty: f64, loads: Vec<Load<D>>) -> Self {
         let sums = |range: std::ops::Range<usize>| {
             range
                 .filter(|&i| particles.kind[i] == ParticleKind::Fluid)
@@ -53,8 +54,8 @@ impl<const D: usize> Report<D> {
             clock: Clock::default(),
             time_step: step.time_step,
             outcome: Outcome::default(),
-            velocity_max,
-            penalty: step.penalty,
+            velocity_max: step.velocity_max,
+            penalty,
             fluid: particles.counts()[ParticleKind::Fluid as usize],
             volume: total,
             kinetic_energy: 0.5 * step.settings.density * square,

@@ -4,16 +4,17 @@ use crate::base::error::{Error, Result, setting};
 use crate::base::lanes::Instructions;
 use crate::base::parallel;
 use crate::base::{Matrix, Vector};
-use crate::boundary::{self, Walls};
+use crate::boundary;
 use crate::breakdown::{self, Symptom};
 use crate::discretisation::VelocityGradient;
-use crate::frame::{Frame, Travel};
+use crate::flow::{Flow, Step};
+use crate::frame::Travel;
 use crate::interpolation::interpolate;
 use crate::loads::loads;
 use crate::neighbours::Grid;
 use crate::particles::{ParticleKind, Particles};
 use crate::report::{Clock, Report};
-use crate::scheme::{self, Alsph, Outcome, Step};
+use crate::scheme::{Alsph, Outcome, Scheme};
 use crate::settings::{Boundary, Settings};
 use crate::shifting::{Change, measures_divergence, shift};
 use rayon::ThreadPool;
@@ -29,15 +30,10 @@ const STEPS_BETWEEN_SORTS: u64 = 16;
 
 pub struct Simulation<const D: usize> {
     settings: Settings,
-    particles: Particles<D>,
+    flow: Flow<D>,
     clock: Clock,
-    frame: Frame<D>,
-    walls: Walls<D>,
-    scheme: Alsph<D>,
+    scheme: Box<dyn Scheme<D>>,
     change: Vec<Change<D>>,
-    largest_eigenvalue: f64,
-    relaxation: f64,
-    dispersion: f64,
     /// Whether `frame` belongs to the present positions.
     prepared: bool,
     /// The particles as the step that broke down left them.
@@ -64,15 +60,10 @@ impl<const D: usize> Simulation<D> {
         pool.install(|| check_particles(&settings, &mut particles))?;
         clock.next_id = clock.next_id.max(particles.id.iter().max().map_or(0, |id| id + 1));
         Ok(Self {
-            walls: Walls::new(&settings),
-            largest_eigenvalue: settings.largest_laplacian_eigenvalue(),
-            relaxation: scheme::relaxation(&settings),
-            dispersion: settings.laplacian_dispersion() * settings.particle_spacing.powi(2),
+            flow: Flow::new(&settings, particles),
+            scheme: Box::new(Alsph::new(&settings)),
             settings,
-            particles,
             clock,
-            frame: Frame::default(),
-            scheme: Alsph::default(),
             change: Vec::new(),
             prepared: false,
             failed: None,
@@ -87,7 +78,7 @@ impl<const D: usize> Simulation<D> {
 
     /// The particles; entries beyond `real` are images.
     pub fn particles(&self) -> &Particles<D> {
-        &self.particles
+        &self.flow.particles
     }
 
     pub fn clock(&self) -> Clock {
@@ -97,7 +88,7 @@ impl<const D: usize> Simulation<D> {
     /// Whether copies of particles, and what is kept from step to step to save its memory, are made NaN when they go stale, so that
     /// what reads them shows. It changes no result else. On from the start where debug assertions are.
     pub fn poison(&mut self, on: bool) {
-        self.frame.images.poisons = on;
+        self.flow.frame.images.poisons = on;
     }
 
     pub fn threads(&self) -> usize {
@@ -143,29 +134,30 @@ impl<const D: usize> Simulation<D> {
         let velocity_max = self.velocity_max();
         let time_step = self.time_step(velocity_max)?;
         self.prepare_step(Travel { time_step, velocity_max, fraction: self.settings.derivative_frame.fraction() });
-        let penalty = self.settings.penalty(velocity_max, time_step, self.largest_eigenvalue);
-        let (relaxation, dispersion) = (self.relaxation, self.dispersion);
-        let shortest = self.settings.particle_spacing.powi(2) / self.largest_eigenvalue;
-        let step = Step { settings: &self.settings, time_step, penalty, relaxation, dispersion, shortest };
+        let step = Step { settings: &self.settings, time_step, velocity_max };
+        let (flow, scheme) = (&mut self.flow, &mut self.scheme);
+        flow.remember();
 
-        let iterations = self.scheme.iterate(step, &mut self.particles, &mut self.frame, &mut self.walls);
-        if let Some(symptom) = breakdown::find(step.settings, &self.particles, &self.frame, time_step) {
+        let iterations = scheme.solve(step, flow);
+        if let Some(symptom) = breakdown::find(step.settings, &flow.particles, &flow.frame, time_step) {
             let error = self.diverged(symptom, time_step, velocity_max);
-            self.restore_initial();
+            self.failed = Some(self.flow.restore());
+            self.prepared = false;
             return Err(error);
         }
-        let acting = |i: usize| self.scheme.acting_pressure(step, &self.particles, i);
-        let loads = loads(step.settings, &self.particles, &self.frame, &self.walls, acting);
-        let mut report = Report::new(step, &self.particles, &self.frame.stencil.volume, velocity_max, loads);
-        self.scheme.advance_positions(step, &mut self.particles, &self.frame); // (12)
-        self.walls.see_for_shift(step.settings, &self.particles, &self.frame);
-        shift(step.settings, &mut self.particles, &self.frame, &self.walls, time_step, velocity_max, &mut self.change); // (18) (19)
+        let acting = |i: usize| scheme.acting_pressure(step, &flow.particles, i);
+        let loads = loads(step.settings, &flow.particles, &flow.frame, &flow.walls, acting);
+        let mut report = Report::new(step, &flow.particles, &flow.frame.stencil.volume, scheme.penalty(), loads);
+        flow.advance_positions(step); // (12)
+        flow.walls.see_for_shift(step.settings, &flow.particles, &flow.frame);
+        let Flow { particles, frame, walls, .. } = flow;
+        shift(step.settings, particles, frame, walls, time_step, velocity_max, &mut self.change); // (18) (19)
         let measured = measures_divergence(step.settings);
-        let divergence = |i: usize| if measured { self.change[i].divergence } else { self.scheme.divergence(i) };
-        report.outcome = Outcome::new(step.settings, &self.particles, iterations, divergence);
+        let divergence = |i: usize| if measured { self.change[i].divergence } else { scheme.divergence(i) };
+        report.outcome = Outcome::new(step.settings, particles, iterations, divergence);
         self.end_step(time_step);
         report.clock = self.clock;
-        report.counts = self.particles.counts();
+        report.counts = self.flow.particles.counts();
         self.history.push(report);
         Ok(())
     }
@@ -190,13 +182,14 @@ impl<const D: usize> Simulation<D> {
 
     fn search(&mut self, travel: Travel) {
         let reorder = self.clock.step.is_multiple_of(STEPS_BETWEEN_SORTS);
-        self.frame.search(&self.settings, &mut self.particles, travel, reorder);
+        self.flow.frame.search(&self.settings, &mut self.flow.particles, travel, reorder);
     }
 
     /// Boundary crossings and clock.
     fn end_step(&mut self, time_step: f64) {
-        self.particles.drop_images();
-        let flow = boundary::end_step(&mut self.particles, &self.settings, &self.frame.grid, &mut self.clock.next_id);
+        self.flow.particles.drop_images();
+        let flow =
+            boundary::end_step(&mut self.flow.particles, &self.settings, &self.flow.frame.grid, &mut self.clock.next_id);
         self.clock.mass_in += flow.inflow;
         self.clock.mass_out += flow.outflow;
         self.clock.time += time_step;
@@ -206,7 +199,7 @@ impl<const D: usize> Simulation<D> {
 
     /// Largest velocity modulus of the particles: what u_max stands for in r_AL and in the stability law.
     fn velocity_max(&self) -> f64 {
-        let velocity = &self.particles.velocity[..self.particles.real];
+        let velocity = &self.flow.particles.velocity[..self.flow.particles.real];
         let largest = |range: Range<usize>| velocity[range].iter().map(|u| u.norm_squared()).fold(0.0, f64::max);
         parallel::reduce(velocity.len(), largest, f64::max).unwrap_or(0.0).sqrt()
     }
@@ -217,10 +210,10 @@ impl<const D: usize> Simulation<D> {
         if !settings.adaptive_time_step || settings.adaptive_until.is_some_and(|end| self.clock.time >= end) {
             return Ok(settings.time_step);
         }
-        let limits = settings.time_step_limits(velocity_max, self.largest_eigenvalue);
+        let limits = self.scheme.limits(settings, velocity_max);
         let fastest_waves = limits.courant.min(settings.time_step_safety * limits.penalty);
         if fastest_waves < SMALLEST_TIME_STEP * settings.time_step {
-            let velocity = &self.particles.velocity[..self.particles.real];
+            let velocity = &self.flow.particles.velocity[..self.flow.particles.real];
             let fastest =
                 (0..velocity.len()).max_by(|&a, &b| velocity[a].norm_squared().total_cmp(&velocity[b].norm_squared()));
             let symptom = Symptom { particle: fastest.unwrap_or(0), field: "velocity", value: velocity_max };
@@ -230,32 +223,22 @@ impl<const D: usize> Simulation<D> {
     }
 
     fn diverged(&self, symptom: Symptom, time_step: f64, velocity_max: f64) -> Error {
-        let (settings, particles) = (&self.settings, &self.particles);
+        let (settings, particles) = (&self.settings, &self.flow.particles);
         let Symptom { particle: i, field, value } = symptom;
-        let limits = settings.time_step_limits(velocity_max, self.largest_eigenvalue);
+        let limits = self.scheme.limits(settings, velocity_max);
         let cause = breakdown::likely_cause(settings, particles, symptom, time_step, limits);
         let position = particles.position[i].as_slice().to_vec();
         let Clock { time, step, .. } = self.clock;
         Error::Diverged { step: step + 1, time, particle: particles.id[i], position, field, value, cause }
     }
 
-    /// Go back to the state before the step, and keep the velocities and pressures that it led to.
-    fn restore_initial(&mut self) {
-        self.particles.drop_images();
-        self.particles.position.copy_from_slice(&self.scheme.position_initial);
-        self.failed = Some(self.particles.clone());
-        self.particles.velocity.copy_from_slice(&self.scheme.velocity_initial);
-        self.particles.pressure.copy_from_slice(&self.scheme.pressure_initial);
-        self.prepared = false;
-    }
-
     /// `look` at the simulation as the step that broke down left it, at the positions before that step; None if none has.
     pub fn look_at_failed<R>(&mut self, look: impl FnOnce(&mut Self) -> R) -> Option<R> {
-        let good = std::mem::replace(&mut self.particles, self.failed.take()?);
+        let good = std::mem::replace(&mut self.flow.particles, self.failed.take()?);
         self.prepared = false;
         let result = look(self);
-        self.particles.drop_images();
-        self.failed = Some(std::mem::replace(&mut self.particles, good));
+        self.flow.particles.drop_images();
+        self.failed = Some(std::mem::replace(&mut self.flow.particles, good));
         self.prepared = false;
         Some(result)
     }
@@ -264,12 +247,12 @@ impl<const D: usize> Simulation<D> {
     pub fn snapshot(&mut self) -> Snapshot<D> {
         self.on_pool(|simulation| {
             simulation.prepare();
-            simulation.frame.stencil.correct();
-            let particles = &simulation.particles;
+            simulation.flow.frame.stencil.correct();
+            let particles = &simulation.flow.particles;
             let mut gradient = vec![Matrix::zeros(); particles.real];
             let operator = VelocityGradient(&particles.velocity);
-            simulation.frame.stencil.for_each_one(operator, &mut gradient, |_, value, gradient| *gradient = value);
-            Snapshot { volume: simulation.frame.stencil.volume[..particles.real].to_vec(), velocity_gradient: gradient }
+            simulation.flow.frame.stencil.for_each_one(operator, &mut gradient, |_, value, gradient| *gradient = value);
+            Snapshot { volume: simulation.flow.frame.stencil.volume[..particles.real].to_vec(), velocity_gradient: gradient }
         })
     }
 
@@ -279,7 +262,8 @@ impl<const D: usize> Simulation<D> {
             simulation.prepare();
             let mut values = vec![(f64::NAN, Vector::repeat(f64::NAN)); points.len()];
             parallel::for_each(&mut values, |k, value| {
-                if let Some(sample) = interpolate(&simulation.settings, &simulation.particles, &simulation.frame, &points[k])
+                if let Some(sample) =
+                    interpolate(&simulation.settings, &simulation.flow.particles, &simulation.flow.frame, &points[k])
                 {
                     *value = sample;
                 }
@@ -290,7 +274,7 @@ impl<const D: usize> Simulation<D> {
 
     /// Positions of the inlet buffer particles, by id.
     pub fn inflow_position(&self) -> Vec<Vector<D>> {
-        self.inlet_particles().into_iter().map(|i| self.particles.position[i]).collect()
+        self.inlet_particles().into_iter().map(|i| self.flow.particles.position[i]).collect()
     }
 
     /// Prescribe the velocities of the inlet buffer particles, in the order of `inflow_position`.
@@ -304,7 +288,7 @@ impl<const D: usize> Simulation<D> {
             return Err(Error::Array { name: "inflow velocity", problem: format!("{:?} is not finite", bad.as_slice()) });
         }
         for (i, u) in inlet.into_iter().zip(velocity) {
-            self.particles.velocity[i] = *u;
+            self.flow.particles.velocity[i] = *u;
         }
         // Images carry velocities too.
         self.prepared = false;
@@ -313,7 +297,7 @@ impl<const D: usize> Simulation<D> {
 
     /// By id, because the order of storage changes whenever the particles are sorted.
     fn inlet_particles(&self) -> Vec<usize> {
-        let particles = &self.particles;
+        let particles = &self.flow.particles;
         let mut inlet: Vec<_> = (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Inlet).collect();
         inlet.sort_unstable_by_key(|&i| particles.id[i]);
         inlet

@@ -1,6 +1,6 @@
 //! What is recorded of a step.
 
-use alsph::scheme::Step;
+use alsph::flow::Step;
 use alsph::{ParticleKind, Report, Settings};
 use approx::assert_relative_eq;
 use serde_json::json;
@@ -23,8 +23,8 @@ fn a_report_is_that_of_plain_sums() {
     }
     let volume: Vec<f64> = (0..particles.real).map(|i| 0.002 + 0.001 * (5.0 * i as f64).sin()).collect();
     let report = |settings: &Settings| {
-        let step = Step { settings, time_step: 0.01, penalty: 0.7, relaxation: 0.0, dispersion: 0.0, shortest: 0.0 };
-        Report::new(step, &particles, &volume, 1.5, Vec::new())
+        let step = Step { settings, time_step: 0.01, velocity_max: 1.5 };
+        Report::new(step, &particles, &volume, 0.7, Vec::new())
     };
     let now = report(&settings);
     let fluid: Vec<_> = (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Fluid).collect();

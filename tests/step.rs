@@ -2,10 +2,11 @@
 
 use alsph::boundary::{Walls, end_step};
 use alsph::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient};
+use alsph::flow::{Before, Flow, Step};
 use alsph::frame::{Frame, Travel};
 use alsph::kernel::{QuinticSpline, Smoothing};
 use alsph::neighbours::Grid;
-use alsph::scheme::{Alsph, Outcome, Step, relaxation};
+use alsph::scheme::{Alsph, Outcome, Scheme};
 use alsph::settings::{SweepPressure, SweepWeights, WallPressure};
 use alsph::shifting::shift;
 use alsph::{Clock, Matrix, ParticleKind, Particles, Settings, Simulation, Vector};
@@ -259,6 +260,11 @@ fn with_buffers(particles: &mut Particles<2>) {
     particles.real = particles.len();
 }
 
+fn first_flow(settings: &Settings, start: Particles<2>) -> Flow<2> {
+    let Set { particles, frame } = first_frame(settings, start);
+    Flow { particles, frame, walls: Walls::new(settings), before: Before::default() }
+}
+
 /// Without viscosity a step changes the velocity by the gradient of the acting pressure, with sweeps and without, and says what
 /// divergence it leaves.
 #[test]
@@ -269,28 +275,28 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
         value["kinematic_viscosity"] = json!(1e-15);
         value["body_force"] = json!([0.0, 0.0]);
         let settings = common::parse(&value);
-        let Set { mut particles, mut frame } = first_frame(&settings, box_of_fluid());
-        let (penalty, relaxation) = (0.05, relaxation(&settings));
-        let shortest = 0.3 * settings.particle_spacing.powi(2);
-        let step = Step { settings: &settings, time_step: TIME_STEP, penalty, relaxation, dispersion: 0.0, shortest };
-        let mut scheme = Alsph::default();
+        let mut flow = first_flow(&settings, box_of_fluid());
+        let step = Step { settings: &settings, time_step: TIME_STEP, velocity_max: 1.0 };
+        let mut scheme = Alsph::new(&settings);
         // A second step in the same frame has nothing of the first.
         for _ in 0..2 {
-            let before = particles.velocity.clone();
-            let iterations = scheme.iterate(step, &mut particles, &mut frame, &mut Walls::new(&settings));
+            flow.remember();
+            let iterations = scheme.solve(step, &mut flow);
+            let Flow { particles, frame, walls, before } = flow;
             let acting: Vec<_> = (0..particles.len()).map(|i| scheme.acting_pressure(step, &particles, i)).collect();
             let seen = acting.iter().zip(&particles.pressure).any(|(acting, p)| (acting - p).abs() > 1e-3);
             assert!(seen, "nothing to be seen");
             let set = Set { particles, frame };
             for (i, gradient) in set.apply(Gradient(&acting)).into_iter().enumerate() {
-                let change = (set.particles.velocity[i] - before[i]) * (settings.density / TIME_STEP);
+                let change = (set.particles.velocity[i] - before.velocity[i]) * (settings.density / TIME_STEP);
                 assert_relative_eq!(change, -gradient, epsilon = 1e-9);
             }
             let divergence = set.apply(Divergence(&set.particles.velocity)).into_iter().map(f64::abs);
             let outcome = Outcome::new(&settings, &set.particles, iterations, |i| scheme.divergence(i));
             assert_relative_eq!(outcome.divergence_max, divergence.clone().fold(0.0, f64::max), epsilon = 1e-12);
             assert_relative_eq!(outcome.divergence_sum, divergence.sum::<f64>(), max_relative = 1e-9);
-            Set { particles, frame } = set;
+            let Set { particles, frame } = set;
+            flow = Flow { particles, frame, walls, before };
         }
     }
 }
@@ -306,11 +312,12 @@ fn at_rest_the_pressure_acts_as_it_is() {
     let mut start = box_of_fluid();
     start.velocity.fill(Vector::zeros());
     start.pressure.fill(2.5);
-    let Set { mut particles, mut frame } = first_frame(&settings, start);
-    let (penalty, relaxation) = (0.05, relaxation(&settings));
-    let step = Step { settings: &settings, time_step: TIME_STEP, penalty, relaxation, dispersion: 0.0, shortest: 0.0 };
-    let mut scheme = Alsph::default();
-    scheme.iterate(step, &mut particles, &mut frame, &mut Walls::new(&settings));
+    let mut flow = first_flow(&settings, start);
+    let step = Step { settings: &settings, time_step: TIME_STEP, velocity_max: 1.0 };
+    let mut scheme = Alsph::new(&settings);
+    flow.remember();
+    scheme.solve(step, &mut flow);
+    let particles = flow.particles;
     for i in 0..particles.real {
         assert_eq!(particles.velocity[i], Vector::<2>::zeros());
         assert_eq!([particles.pressure[i], scheme.acting_pressure(step, &particles, i)], [2.5; 2]);

@@ -18,6 +18,7 @@ FLOORS = (
     ("discretisation", "faces"),
     ("frame",),
     ("boundary", "breakdown", "interpolation"),
+    ("flow",),
     ("loads", "shifting"),
     ("scheme",),
     ("report",),

@@ -2,57 +2,21 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
-use crate::boundary::{Walls, deep_in_inlet, extrapolate};
+use crate::boundary::{deep_in_inlet, extrapolate};
 use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, vector_laplacian};
+use crate::flow::{Flow, Step};
 use crate::frame::Frame;
 use crate::halo::Poison;
 use crate::particles::{ParticleKind, Particles};
-use crate::scheme::projection::Projection;
-use crate::settings::{DerivativeFrame, Settings, VelocityLaplacian, WallPressure};
+use crate::scheme::projection::{Projection, relaxation};
+use crate::scheme::{Outcome, Scheme};
+use crate::settings::{DerivativeFrame, Settings, TimeStepLimits, VelocityLaplacian, WallPressure};
 use crate::shifting::measures_divergence;
 
-/// How a step ended.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Outcome {
-    pub iterations: usize,
-    /// Whether ε of (13) was reached, else the cap ended the iteration.
-    pub converged: bool,
-    /// max |∇·u| over the fluid.
-    pub divergence_max: f64,
-    /// Σ |∇·u| over the fluid.
-    pub divergence_sum: f64,
-}
-
-impl Outcome {
-    /// That of so many iterations which left this ∇·u, less [`Derived::solenoidal`].
-    pub fn new<const D: usize>(
-        settings: &Settings,
-        particles: &Particles<D>,
-        iterations: usize,
-        divergence: impl Fn(usize) -> f64 + Sync,
-    ) -> Self {
-        let norms = |range: std::ops::Range<usize>| {
-            range.filter(|&i| particles.kind[i] == ParticleKind::Fluid).fold((0.0, 0.0), |(max, sum): (f64, f64), i| {
-                let value = divergence(i).abs();
-                // NaN must not hide behind max, which drops it.
-                (if value > max || value.is_nan() { value } else { max }, sum + value)
-            })
-        };
-        let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
-        let (divergence_max, divergence_sum) =
-            parallel::reduce(particles.real, norms, |a, b| (larger(a.0, b.0), a.1 + b.1)).unwrap_or_default();
-        let converged = divergence_max <= settings.divergence_tolerance;
-        Self { iterations, converged, divergence_max, divergence_sum }
-    }
-}
-
 /// The fields of one step beside those of the particles, real particles and images.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Alsph<const D: usize> {
-    /// r^n, u^n, p^n of the real particles.
-    pub position_initial: Vec<Vector<D>>,
-    pub velocity_initial: Vec<Vector<D>>,
-    pub pressure_initial: Vec<f64>,
+    coefficients: Coefficients,
     /// ∇·u^m less [`Derived::solenoidal`], and p^m side by side, because (8) and (10) read them together.
     divergence_pressure: Vec<[f64; 2]>,
     /// The same of the iteration before, as (8) had it.
@@ -82,56 +46,66 @@ impl<const D: usize> Poison for Derived<D> {
     const POISON: Self = Self { laplacian: Poison::POISON, solenoidal: Poison::POISON };
 }
 
-/// What stays the same during one step.
-#[derive(Clone, Copy)]
-pub struct Step<'a> {
-    pub settings: &'a Settings,
-    /// Δt.
-    pub time_step: f64,
-    /// r_AL.
-    pub penalty: f64,
+/// What the equations are multiplied by.
+#[derive(Clone, Copy, Debug)]
+pub struct Coefficients {
+    /// r_AL of the step.
+    penalty: f64,
+    /// λ_max Δx² of the compact Laplacian.
+    largest_eigenvalue: f64,
     /// σ of the projection sweeps, a length squared.
     pub relaxation: f64,
     /// The error of the compact Laplacian of a wave over its square wave number, a length squared.
-    pub dispersion: f64,
+    dispersion: f64,
     /// One over the largest eigenvalue of the compact Laplacian, a length squared: so much of it takes the shortest waves off.
     pub shortest: f64,
 }
 
-impl<const D: usize> Alsph<D> {
-    /// Advance velocity and pressure to n+1 and leave `particles.position` at the frame of the last derivatives; see
-    /// [`Alsph::advance_positions`]. `frame` holds the stencil at r^n, or in the middle of the step. Returns the number of iterations;
-    /// what they leave of ∇·u is found with the shift where that can ([`measures_divergence`]), else by [`Alsph::divergence`].
-    pub fn iterate(
-        &mut self,
-        step: Step,
-        particles: &mut Particles<D>,
-        frame: &mut Frame<D>,
-        walls: &mut Walls<D>,
-    ) -> usize {
-        self.begin(particles, frame);
-        self.velocity_derivatives(step, particles, frame, walls);
-        self.begin_viscous_term(step, particles, frame, walls);
+impl Coefficients {
+    fn new(settings: &Settings) -> Self {
+        let largest_eigenvalue = settings.largest_laplacian_eigenvalue();
+        let area = settings.particle_spacing.powi(2);
+        Self {
+            penalty: f64::NAN,
+            largest_eigenvalue,
+            relaxation: relaxation(settings),
+            dispersion: settings.laplacian_dispersion() * area,
+            shortest: area / largest_eigenvalue,
+        }
+    }
+}
+
+impl<const D: usize> Scheme<D> for Alsph<D> {
+    fn limits(&self, settings: &Settings, velocity_max: f64) -> TimeStepLimits {
+        settings.time_step_limits(velocity_max, self.coefficients.largest_eigenvalue)
+    }
+
+    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> usize {
+        let largest_eigenvalue = self.coefficients.largest_eigenvalue;
+        self.coefficients.penalty = step.settings.penalty(step.velocity_max, step.time_step, largest_eigenvalue);
+        self.begin(flow);
+        self.velocity_derivatives(step, flow);
+        self.begin_viscous_term(step, flow);
         for iteration in 1.. {
-            self.predict_velocity(step, particles, frame); // (8)
-            self.update_pressure(step, particles, frame); // (10) (20)
-            self.correct_velocity(step, particles, frame); // (11)
+            self.predict_velocity(step, flow); // (8)
+            self.update_pressure(step, flow); // (10) (20)
+            self.correct_velocity(step, flow); // (11)
             if iteration == step.settings.max_iterations {
-                self.projection.sweep(step, particles, frame, &self.derived);
+                self.projection.sweep(step, self.coefficients, flow, &self.derived);
             }
             if step.settings.derivative_frame == DerivativeFrame::Updated {
-                self.advance_positions(step, particles, frame); // (12): Algorithm 1 takes its derivatives at r^{n+1,m}
-                frame.update(step.settings, particles);
+                flow.advance_positions(step); // (12): Algorithm 1 takes its derivatives at r^{n+1,m}
+                flow.frame.update(step.settings, &flow.particles);
             }
             std::mem::swap(&mut self.divergence_pressure, &mut self.divergence_pressure_before);
             let last = iteration == step.settings.max_iterations;
             if last && measures_divergence(step.settings) {
-                walls.see(step.settings, particles, frame); // for the loads
+                flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
                 return iteration;
             }
-            self.velocity_derivatives(step, particles, frame, walls);
-            self.check_images(particles, frame, walls);
-            let outcome = Outcome::new(step.settings, particles, iteration, |i| self.divergence(i)); // (13)
+            self.velocity_derivatives(step, flow);
+            self.check_images(flow);
+            let outcome = Outcome::new(step.settings, &flow.particles, iteration, |i| self.divergence(i)); // (13)
             // The first iteration has the old velocity only in its viscous term.
             let first_order = iteration == 1 && step.settings.viscous_theta < 1.0;
             if (outcome.converged && !first_order) || last || !outcome.divergence_max.is_finite() {
@@ -141,24 +115,39 @@ impl<const D: usize> Alsph<D> {
         unreachable!("the loop ends at its cap")
     }
 
-    /// What the velocity of the step had the gradient of: p^{n+1}, what the penalty term of (8) pushed with beside it, minus ρ r_AL ∇·u^m, and what
-    /// the pressure does not keep of the sweeps. The rest tends to zero with ∇·u, but where the flow turns sharply not in the mean.
-    pub fn acting_pressure(&self, step: Step, particles: &Particles<D>, i: usize) -> f64 {
-        let penalty = -step.settings.density * step.penalty * self.divergence_pressure_before[i][0];
-        particles.pressure[i] + penalty + self.projection.unkept(particles, i)
-    }
-
-    /// ∇·u of the last derivatives, less [`Derived::solenoidal`].
-    pub fn divergence(&self, i: usize) -> f64 {
+    fn divergence(&self, i: usize) -> f64 {
         self.divergence_pressure[i][0]
     }
 
-    fn begin(&mut self, particles: &Particles<D>, frame: &Frame<D>) {
+    /// p^{n+1}, what the penalty term of (8) pushed with beside it, minus ρ r_AL ∇·u^m, and what the pressure does not keep of the sweeps.
+    /// The rest tends to zero with ∇·u, but where the flow turns sharply not in the mean.
+    fn acting_pressure(&self, step: Step, particles: &Particles<D>, i: usize) -> f64 {
+        let penalty = -step.settings.density * self.coefficients.penalty * self.divergence_pressure_before[i][0];
+        particles.pressure[i] + penalty + self.projection.unkept(particles, i)
+    }
+
+    fn penalty(&self) -> f64 {
+        self.coefficients.penalty
+    }
+}
+
+impl<const D: usize> Alsph<D> {
+    pub fn new(settings: &Settings) -> Self {
+        Self {
+            coefficients: Coefficients::new(settings),
+            divergence_pressure: Vec::new(),
+            divergence_pressure_before: Vec::new(),
+            derived: Vec::new(),
+            explicit: Vec::new(),
+            velocity_star: Vec::new(),
+            pressure_laplacian: Vec::new(),
+            pressure_gradient: Vec::new(),
+            projection: Projection::default(),
+        }
+    }
+
+    fn begin(&mut self, Flow { particles, frame, .. }: &Flow<D>) {
         let (real, count) = (particles.real, particles.len());
-        let start = if frame.start.is_empty() { &particles.position[..real] } else { &frame.start[..] };
-        copy(start, &mut self.position_initial);
-        copy(&particles.velocity[..real], &mut self.velocity_initial);
-        copy(&particles.pressure[..real], &mut self.pressure_initial);
         let images = &frame.images;
         images.blank(&mut self.divergence_pressure, count);
         images.blank(&mut self.divergence_pressure_before, count);
@@ -169,7 +158,7 @@ impl<const D: usize> Alsph<D> {
     }
 
     /// ∇·u^m and ∇²u^m, and p^m beside ∇·u^m: the first pass over a frame, so it forms the corrections too.
-    fn velocity_derivatives(&mut self, step: Step, particles: &Particles<D>, frame: &mut Frame<D>, walls: &mut Walls<D>) {
+    fn velocity_derivatives(&mut self, step: Step, Flow { particles, frame, walls, .. }: &mut Flow<D>) {
         walls.see(step.settings, particles, frame);
         let (velocity, pressure) = (&particles.velocity, &particles.pressure);
         let walls = &*walls;
@@ -193,22 +182,23 @@ impl<const D: usize> Alsph<D> {
     }
 
     /// What u^n gives of the viscous term.
-    fn begin_viscous_term(&mut self, step: Step, particles: &Particles<D>, frame: &Frame<D>, walls: &mut Walls<D>) {
+    fn begin_viscous_term(&mut self, step: Step, flow: &mut Flow<D>) {
         if step.settings.viscous_order == 4 {
-            self.sharpen_laplacian(step, particles, frame, walls);
+            self.sharpen_laplacian(step, flow);
         } else {
             self.explicit.clear();
         }
         let (share, derived) = (1.0 - step.settings.viscous_theta, &self.derived);
         if share > 0.0 {
-            self.explicit.resize(particles.real, Vector::zeros());
+            self.explicit.resize(flow.particles.real, Vector::zeros());
             parallel::for_each(&mut self.explicit, |i, explicit| *explicit += derived[i].laplacian * share);
         }
     }
 
     /// The error of the compact Laplacian of a wave of wave number k is `dispersion` k² of it: take it off.
-    fn sharpen_laplacian(&mut self, step: Step, particles: &Particles<D>, frame: &Frame<D>, walls: &mut Walls<D>) {
-        walls.sharpen(step.settings, particles, frame, |i| self.derived[i].laplacian, step.dispersion);
+    fn sharpen_laplacian(&mut self, step: Step, Flow { particles, frame, walls, .. }: &mut Flow<D>) {
+        let factor = self.coefficients.dispersion;
+        walls.sharpen(step.settings, particles, frame, |i| self.derived[i].laplacian, factor);
         let dispersion = &walls.dispersion;
         let count = particles.real;
         frame.images.blank(&mut self.explicit, count);
@@ -220,11 +210,11 @@ impl<const D: usize> Alsph<D> {
     }
 
     /// u* (8), and ∇²p^m for (10), which reads the same neighbours.
-    fn predict_velocity(&mut self, step: Step, particles: &Particles<D>, frame: &Frame<D>) {
+    fn predict_velocity(&mut self, step: Step, Flow { particles, frame, before, .. }: &Flow<D>) {
         let gravity = Vector::<D>::from_column_slice(&step.settings.body_force);
         let (dt, viscosity) = (step.time_step, step.settings.kinematic_viscosity);
         let paper_walls = step.settings.wall_pressure == WallPressure::Paper;
-        let (initial, derived) = (&self.velocity_initial, &self.derived);
+        let (initial, derived, r_al) = (&before.velocity, &self.derived, self.coefficients.penalty);
         let theta = step.settings.viscous_theta;
         let explicit = |i: usize| self.explicit.get(i).copied().unwrap_or_else(Vector::zeros);
         frame.stencil.for_each(
@@ -241,8 +231,7 @@ impl<const D: usize> Alsph<D> {
                 *star = if still {
                     initial[i]
                 } else {
-                    initial[i]
-                        + (penalty * step.penalty + (derived[i].laplacian * theta + explicit(i)) * viscosity + gravity) * dt
+                    initial[i] + (penalty * r_al + (derived[i].laplacian * theta + explicit(i)) * viscosity + gravity) * dt
                 };
             },
         );
@@ -250,7 +239,7 @@ impl<const D: usize> Alsph<D> {
     }
 
     /// p^{m+1} (10), with the pressure of solid particles (20).
-    fn update_pressure(&mut self, step: Step, particles: &mut Particles<D>, frame: &Frame<D>) {
+    fn update_pressure(&mut self, step: Step, Flow { particles, frame, before, .. }: &mut Flow<D>) {
         if step.settings.wall_pressure == WallPressure::Linear {
             let gradient = &mut self.pressure_gradient;
             frame.images.blank(gradient, particles.len());
@@ -259,9 +248,10 @@ impl<const D: usize> Alsph<D> {
         }
         let Particles { kind, normal, position, pressure, .. } = particles;
         let (kind, normal) = (&*kind, &*normal);
-        let Step { settings, time_step: dt, penalty, .. } = step;
+        let Step { settings, time_step: dt, .. } = step;
+        let penalty = self.coefficients.penalty;
         let paper_walls = settings.wall_pressure == WallPressure::Paper;
-        let (star, initial, laplacian) = (&self.velocity_star, &self.velocity_initial, &self.pressure_laplacian);
+        let (star, initial, laplacian) = (&self.velocity_star, &before.velocity, &self.pressure_laplacian);
         let derived = &self.derived;
         let (position, deep_in_inlet) = (&*position, deep_in_inlet(settings));
         frame.stencil.for_each_one(Divergence(star), frame.images.real(pressure), |i, divergence, p| {
@@ -298,7 +288,7 @@ impl<const D: usize> Alsph<D> {
     }
 
     /// u^{m+1} (11). Buffers and solids keep their velocities.
-    fn correct_velocity(&mut self, step: Step, particles: &mut Particles<D>, frame: &Frame<D>) {
+    fn correct_velocity(&mut self, step: Step, Flow { particles, frame, .. }: &mut Flow<D>) {
         let Particles { kind, pressure, velocity, .. } = particles;
         let (kind, pressure, star) = (&*kind, &*pressure, &self.velocity_star);
         let factor = step.time_step / step.settings.density;
@@ -310,21 +300,8 @@ impl<const D: usize> Alsph<D> {
         frame.images.vectors(&mut particles.velocity);
     }
 
-    /// r^{n+1} (12), for everything that moves with its velocity.
-    pub fn advance_positions(&self, step: Step, particles: &mut Particles<D>, frame: &Frame<D>) {
-        let mut position = std::mem::take(&mut particles.position);
-        parallel::for_each(frame.images.real(&mut position), |i, r| {
-            if !particles.is_fixed(i, &step.settings.bodies) {
-                let velocity = self.velocity_initial[i] + particles.velocity[i];
-                *r = self.position_initial[i] + velocity * (0.5 * step.time_step);
-            }
-        });
-        frame.images.positions(&mut position);
-        particles.position = position;
-    }
-
     /// Panic if a stage has left stale images that look fresh. Nothing unless poison is on.
-    fn check_images(&self, particles: &Particles<D>, frame: &Frame<D>, walls: &Walls<D>) {
+    fn check_images(&self, Flow { particles, frame, walls, .. }: &Flow<D>) {
         let images = &frame.images;
         images.check(&particles.position, |k, x| images.position(k, x));
         for field in
@@ -337,9 +314,4 @@ impl<const D: usize> Alsph<D> {
         }
         images.check(&self.divergence_pressure, |_, value| value);
     }
-}
-
-fn copy<T: Copy>(from: &[T], to: &mut Vec<T>) {
-    to.clear();
-    to.extend_from_slice(from);
 }

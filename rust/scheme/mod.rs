@@ -1,7 +1,66 @@
-//! Time integration schemes.
+//! Schemes: how velocity and pressure come from n to n+1.
 
 mod alsph;
 mod projection;
 
-pub use alsph::{Alsph, Derived, Outcome, Step};
-pub use projection::relaxation;
+use crate::base::parallel;
+use crate::flow::{Flow, Step};
+use crate::particles::{ParticleKind, Particles};
+use crate::settings::{Settings, TimeStepLimits};
+
+pub use alsph::{Alsph, Derived};
+
+/// A scheme. What a step does beside it, from the search of neighbours to loads and shift, is the same for all.
+pub trait Scheme<const D: usize>: Send + Sync {
+    /// Upper bounds of Δt for the largest velocity `velocity_max`.
+    fn limits(&self, settings: &Settings, velocity_max: f64) -> TimeStepLimits;
+
+    /// Advance velocity and pressure to n+1, and leave `particles.position` in the frame of the last derivatives; that of the flow stands at
+    /// r^n, or in the middle of the step. Returns the number of iterations. What they leave of ∇·u is found with the shift where that
+    /// can ([`crate::shifting::measures_divergence`]), else by [`Scheme::divergence`].
+    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> usize;
+
+    /// ∇·u of the last derivatives, less [`Derived::solenoidal`].
+    fn divergence(&self, i: usize) -> f64;
+
+    /// What the velocity of the step had the gradient of.
+    fn acting_pressure(&self, step: Step, particles: &Particles<D>, i: usize) -> f64;
+
+    /// r_AL of the last step; NaN for a scheme without a penalty.
+    fn penalty(&self) -> f64;
+}
+
+/// How a step ended.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Outcome {
+    pub iterations: usize,
+    /// Whether ε of (13) was reached, else the cap ended the iteration.
+    pub converged: bool,
+    /// max |∇·u| over the fluid.
+    pub divergence_max: f64,
+    /// Σ |∇·u| over the fluid.
+    pub divergence_sum: f64,
+}
+
+impl Outcome {
+    /// That of so many iterations which left this ∇·u, less [`Derived::solenoidal`].
+    pub fn new<const D: usize>(
+        settings: &Settings,
+        particles: &Particles<D>,
+        iterations: usize,
+        divergence: impl Fn(usize) -> f64 + Sync,
+    ) -> Self {
+        let norms = |range: std::ops::Range<usize>| {
+            range.filter(|&i| particles.kind[i] == ParticleKind::Fluid).fold((0.0, 0.0), |(max, sum): (f64, f64), i| {
+                let value = divergence(i).abs();
+                // NaN must not hide behind max, which drops it.
+                (if value > max || value.is_nan() { value } else { max }, sum + value)
+            })
+        };
+        let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
+        let (divergence_max, divergence_sum) =
+            parallel::reduce(particles.real, norms, |a, b| (larger(a.0, b.0), a.1 + b.1)).unwrap_or_default();
+        let converged = divergence_max <= settings.divergence_tolerance;
+        Self { iterations, converged, divergence_max, divergence_sum }
+    }
+}

@@ -21,9 +21,10 @@ use crate::base::Vector;
 use crate::base::parallel;
 use crate::boundary::{deep_in_inlet, extrapolate};
 use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian};
-use crate::frame::Frame;
+use crate::flow::{Flow, Step};
 use crate::particles::{ParticleKind, Particles};
-use crate::scheme::{Derived, Step};
+use crate::scheme::Derived;
+use crate::scheme::alsph::Coefficients;
 use crate::settings::{Settings, SweepPressure, SweepWeights};
 
 /// κ: the share of a sweep's potential that the pressure keeps. The rest of it is mostly noise of the one step; all of the
@@ -85,12 +86,13 @@ impl Projection {
     pub fn sweep<const D: usize>(
         &mut self,
         step: Step,
-        particles: &mut Particles<D>,
-        frame: &Frame<D>,
+        coefficients: Coefficients,
+        Flow { particles, frame, .. }: &mut Flow<D>,
         derived: &[Derived<D>],
     ) {
         self.pressure_before.extend_from_slice(&particles.pressure);
-        let Step { settings, time_step, relaxation, shortest, .. } = step;
+        let Step { settings, time_step, .. } = step;
+        let Coefficients { relaxation, shortest, .. } = coefficients;
         let Particles { real, kind, position, pressure, velocity, .. } = particles;
         let (kind, position) = (&kind[..*real], &*position);
         let deep_in_inlet = deep_in_inlet(settings);

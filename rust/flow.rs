@@ -1,0 +1,81 @@
+//! The flow that a step advances, whatever the scheme.
+
+use crate::base::Vector;
+use crate::base::parallel;
+use crate::boundary::Walls;
+use crate::frame::Frame;
+use crate::particles::Particles;
+use crate::settings::Settings;
+
+/// What stays the same during a step.
+#[derive(Clone, Copy)]
+pub struct Step<'a> {
+    pub settings: &'a Settings,
+    /// Δt.
+    pub time_step: f64,
+    /// u_max of u^n.
+    pub velocity_max: f64,
+}
+
+/// Particles, the frame that their derivatives are taken in, what solids show, and the state before the step.
+#[derive(Debug)]
+pub struct Flow<const D: usize> {
+    pub particles: Particles<D>,
+    pub frame: Frame<D>,
+    pub walls: Walls<D>,
+    pub before: Before<D>,
+}
+
+/// r^n, u^n, p^n of the real particles.
+#[derive(Debug, Default)]
+pub struct Before<const D: usize> {
+    pub position: Vec<Vector<D>>,
+    pub velocity: Vec<Vector<D>>,
+    pub pressure: Vec<f64>,
+}
+
+impl<const D: usize> Flow<D> {
+    pub fn new(settings: &Settings, particles: Particles<D>) -> Self {
+        Self { particles, frame: Frame::default(), walls: Walls::new(settings), before: Before::default() }
+    }
+
+    /// Keep the state before a step, whose frame may stand in the middle of it.
+    pub fn remember(&mut self) {
+        let Self { particles, frame, before, .. } = self;
+        let real = particles.real;
+        let start = if frame.start.is_empty() { &particles.position[..real] } else { &frame.start[..] };
+        copy(start, &mut before.position);
+        copy(&particles.velocity[..real], &mut before.velocity);
+        copy(&particles.pressure[..real], &mut before.pressure);
+    }
+
+    /// Go back to the state before the step. Returns the particles with the velocities and pressures that it led to, where they stood before.
+    pub fn restore(&mut self) -> Particles<D> {
+        let Self { particles, before, .. } = self;
+        particles.drop_images();
+        particles.position.copy_from_slice(&before.position);
+        let failed = particles.clone();
+        particles.velocity.copy_from_slice(&before.velocity);
+        particles.pressure.copy_from_slice(&before.pressure);
+        failed
+    }
+
+    /// r^{n+1} (12), for everything that moves with its velocity.
+    pub fn advance_positions(&mut self, step: Step) {
+        let Self { particles, frame, before, .. } = self;
+        let mut position = std::mem::take(&mut particles.position);
+        parallel::for_each(frame.images.real(&mut position), |i, r| {
+            if !particles.is_fixed(i, &step.settings.bodies) {
+                let velocity = before.velocity[i] + particles.velocity[i];
+                *r = before.position[i] + velocity * (0.5 * step.time_step);
+            }
+        });
+        frame.images.positions(&mut position);
+        particles.position = position;
+    }
+}
+
+fn copy<T: Copy>(from: &[T], to: &mut Vec<T>) {
+    to.clear();
+    to.extend_from_slice(from);
+}
