@@ -110,6 +110,7 @@ pub fn likely_cause<const D: usize>(
     let bounds = [
         ("Courant", limits.courant),
         ("penalty", limits.penalty),
+        ("acoustic", limits.acoustic),
         ("viscous", limits.viscous),
         ("body force", limits.body_force),
     ];

@@ -181,18 +181,19 @@ impl PySimulation {
     }
 }
 
-/// Bounds of Δt: ``courant``, ``penalty``, ``viscous``, ``body_force`` (inf where it does not apply), and ``lambda_max`` (λ_max Δx²).
+/// Bounds of Δt: ``courant``, ``penalty``, ``acoustic``, ``viscous``, ``body_force`` (inf where it does not apply), and ``lambda_max`` (λ_max Δx²).
 #[pyfunction]
 fn time_step_limits<'py>(py: Python<'py>, settings: &str, velocity_max: f64) -> PyResult<Bound<'py, PyDict>> {
     let settings = Settings::from_json(settings)?;
-    let lambda = settings.largest_laplacian_eigenvalue();
-    let limits = settings.time_step_limits(velocity_max, lambda);
+    let largest = settings.largest_eigenvalues();
+    let limits = settings.time_step_limits(velocity_max, largest);
     let dict = PyDict::new(py);
     dict.set_item("courant", limits.courant)?;
     dict.set_item("penalty", limits.penalty)?;
+    dict.set_item("acoustic", limits.acoustic)?;
     dict.set_item("viscous", limits.viscous)?;
     dict.set_item("body_force", limits.body_force)?;
-    dict.set_item("lambda_max", lambda)?;
+    dict.set_item("lambda_max", largest.laplacian)?;
     Ok(dict)
 }
 

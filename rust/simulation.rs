@@ -14,7 +14,7 @@ use crate::loads::loads;
 use crate::neighbours::Grid;
 use crate::particles::{ParticleKind, Particles};
 use crate::report::{Clock, Report};
-use crate::scheme::{Alsph, Outcome, Scheme};
+use crate::scheme::{self, Outcome, Scheme};
 use crate::settings::{Boundary, Settings};
 use crate::shifting::{Change, measures_divergence, shift};
 use rayon::ThreadPool;
@@ -61,7 +61,7 @@ impl<const D: usize> Simulation<D> {
         clock.next_id = clock.next_id.max(particles.id.iter().max().map_or(0, |id| id + 1));
         Ok(Self {
             flow: Flow::new(&settings, particles),
-            scheme: Box::new(Alsph::new(&settings)),
+            scheme: scheme::build(&settings),
             settings,
             clock,
             change: Vec::new(),
@@ -147,7 +147,7 @@ impl<const D: usize> Simulation<D> {
         }
         let acting = |i: usize| scheme.acting_pressure(step, &flow.particles, i);
         let loads = loads(step.settings, &flow.particles, &flow.frame, &flow.walls, acting);
-        let mut report = Report::new(step, &flow.particles, &flow.frame.stencil.volume, scheme.penalty(), loads);
+        let mut report = Report::new(step, &flow.particles, &flow.frame.stencil.volume, scheme.penalty(time_step), loads);
         flow.advance_positions(step); // (12)
         flow.walls.see_for_shift(step.settings, &flow.particles, &flow.frame);
         let Flow { particles, frame, walls, .. } = flow;
@@ -211,7 +211,7 @@ impl<const D: usize> Simulation<D> {
             return Ok(settings.time_step);
         }
         let limits = self.scheme.limits(settings, velocity_max);
-        let fastest_waves = limits.courant.min(settings.time_step_safety * limits.penalty);
+        let fastest_waves = limits.courant.min(settings.time_step_safety * limits.penalty).min(limits.acoustic);
         if fastest_waves < SMALLEST_TIME_STEP * settings.time_step {
             let velocity = &self.flow.particles.velocity[..self.flow.particles.real];
             let fastest =

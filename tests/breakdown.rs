@@ -131,7 +131,7 @@ fn cause(settings: &Settings, particles: &Particles<2>, field: &'static str, tim
         particles,
         symptom,
         time_step,
-        TimeStepLimits { courant: f64::INFINITY, penalty, viscous, body_force },
+        TimeStepLimits { courant: f64::INFINITY, penalty, acoustic: f64::INFINITY, viscous, body_force },
     )
 }
 

@@ -592,7 +592,7 @@ fn the_adaptive_step_obeys_the_stability_law_and_the_user() {
     let mut value = common::settings_value::<2>(1.0 / 24.0, "periodic");
     value["time_step"] = 0.02.into();
     let settings = common::parse(&value);
-    let law = settings.time_step_limits(1.0, settings.largest_laplacian_eigenvalue()).penalty;
+    let law = settings.time_step_limits(1.0, settings.largest_eigenvalues()).penalty;
     let mut simulation = Simulation::new(settings, taylor_green(24, 0.0), Clock::default(), Some(2)).expect("valid");
     simulation.advance(20, None).expect("stable");
     for report in simulation.take_history() {

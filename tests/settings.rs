@@ -1,5 +1,6 @@
 //! Which settings are refused, and the lengths, eigenvalues and limits that follow from those that are not.
 
+use alsph::settings::Eigenvalues;
 use alsph::{Settings, Vector};
 use approx::assert_relative_eq;
 use serde_json::{Value, json};
@@ -16,6 +17,8 @@ fn with(changes: &[(&str, Value)]) -> Value {
     }
     value
 }
+
+const LARGEST: Eigenvalues = Eigenvalues { laplacian: 8.0, projection: 0.5 };
 
 #[test]
 fn settings_beyond_their_bounds_are_refused_by_name() {
@@ -95,7 +98,7 @@ fn lengths_follow_from_the_spacing() {
 fn the_time_step_is_limited_by_penalty_friction_and_body_force() {
     let limits = |rule: &str| {
         let changes = [("/wall_velocity", rule.into()), ("/body_force", json!([0.3, -0.4]))];
-        common::parse(&with(&changes)).time_step_limits(2.0, 8.0)
+        common::parse(&with(&changes)).time_step_limits(2.0, LARGEST)
     };
     let (h, adami, cubic) = (0.2f64 / 3.0, limits("adami"), limits("cubic"));
     // r_AL Δt λ/Δx² = 2 with r_AL = C u² Δt.
@@ -104,7 +107,7 @@ fn the_time_step_is_limited_by_penalty_friction_and_body_force() {
     assert_relative_eq!(adami.viscous, 0.125 * h * h / 0.01, max_relative = 1e-12);
     assert_relative_eq!(cubic.viscous, 0.0625 * h * h / 0.01, max_relative = 1e-12);
     assert_relative_eq!(adami.body_force, 0.25 * (h / 0.5).sqrt(), max_relative = 1e-12);
-    let still = common::settings::<2>(0.05, "none").time_step_limits(0.0, 8.0);
+    let still = common::settings::<2>(0.05, "none").time_step_limits(0.0, LARGEST);
     assert!(still.penalty == f64::INFINITY && still.body_force == f64::INFINITY);
 }
 
@@ -112,7 +115,7 @@ fn the_time_step_is_limited_by_penalty_friction_and_body_force() {
 #[test]
 fn the_penalty_follows_the_step() {
     let settings = common::parse(&with(&[("/penalty_constant", Value::Null), ("/courant", json!(0.25))]));
-    let limits = settings.time_step_limits(2.0, 8.0);
+    let limits = settings.time_step_limits(2.0, LARGEST);
     assert!(limits.penalty == f64::INFINITY);
     assert_relative_eq!(limits.courant, 0.25 * 0.05 / 2.0, max_relative = 1e-12);
     for time_step in [1e-4, 1e-2] {
@@ -151,4 +154,32 @@ fn eigenvalues_and_dispersion_are_those_of_plain_sums() {
 fn only_the_frame_in_the_middle_lies_ahead() {
     let fraction = |frame: &str| common::parse(&with(&[("/derivative_frame", frame.into())])).derivative_frame.fraction();
     assert_eq!(["initial", "updated", "midpoint"].map(fraction), [0.0, 0.0, 0.5]);
+}
+
+#[test]
+fn a_weakly_compressible_scheme_has_parameters_of_its_own() {
+    let wcsph = json!({"kind": "wcsph", "sound_speed": 10.0, "density_diffusion": "molteni", "diffusion_coefficient": 0.1});
+    let refused = |changes: &[(&str, Value)]| {
+        let value = with(&[&[("/scheme", wcsph.clone())], changes].concat());
+        Settings::from_json(&value.to_string()).expect_err("refused").to_string()
+    };
+    for (pointer, bad, word) in [
+        ("/scheme/sound_speed", json!(0.0), "sound_speed"),
+        ("/scheme/diffusion_coefficient", json!(1.5), "diffusion_coefficient"),
+        ("/scheme/density_diffusion", json!("fourtakas"), "fourtakas"),
+        ("/velocity_laplacian", json!("vector"), "velocity_laplacian"),
+        ("/wall_pressure", json!("paper"), "wall_pressure"),
+        ("/scheme", json!({"kind": "edac", "sound_speed": 10.0, "diffusion_coefficient": 0.5, "sweeps": 4}), "sweeps"),
+    ] {
+        let text = refused(&[("/velocity_laplacian", json!("scalar")), ("/wall_pressure", json!("linear")), (pointer, bad)]);
+        assert!(text.contains(word), "{text}");
+    }
+    // The step follows the sound and the flow: 0.45 of 2 Δx/√λ.
+    let settings = common::parse(&with(&[
+        ("/scheme", wcsph),
+        ("/velocity_laplacian", json!("scalar")),
+        ("/wall_pressure", json!("linear")),
+    ]));
+    assert_relative_eq!(settings.time_step_limits(2.0, LARGEST).acoustic, 0.9 * 0.05 / (0.5_f64.sqrt() * 12.0));
+    assert_eq!(common::settings::<2>(0.05, "none").time_step_limits(2.0, LARGEST).acoustic, f64::INFINITY);
 }

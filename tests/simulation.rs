@@ -185,7 +185,7 @@ fn friction_and_body_force_limit_the_step() {
         value["time_step"] = 1e-2.into();
         value[key] = chosen;
         let settings = common::parse(&value);
-        let limits = settings.time_step_limits(1.0, settings.largest_laplacian_eigenvalue());
+        let limits = settings.time_step_limits(1.0, settings.largest_eigenvalues());
         let expected = [settings.time_step, limits.courant, 0.9 * limits.penalty, limits.viscous, limits.body_force];
         let mut simulation = begun(&value, particles, Clock::default()).expect("valid");
         _ = simulation.advance(1, None);

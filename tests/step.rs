@@ -301,6 +301,59 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
     }
 }
 
+/// A weakly compressible step is half of p, all of u and the other half of p, with what diffuses of p in the middle of it.
+#[test]
+fn a_weakly_compressible_step_is_that_of_its_equations() {
+    for (scheme, coefficient, corrected) in [
+        (
+            json!({"kind": "wcsph", "sound_speed": 9.0, "density_diffusion": "none", "diffusion_coefficient": 0.1}),
+            0.0,
+            false,
+        ),
+        (
+            json!({"kind": "wcsph", "sound_speed": 9.0, "density_diffusion": "molteni", "diffusion_coefficient": 0.1}),
+            0.1,
+            false,
+        ),
+        (
+            json!({"kind": "wcsph", "sound_speed": 9.0, "density_diffusion": "antuono", "diffusion_coefficient": 0.2}),
+            0.2,
+            true,
+        ),
+        (json!({"kind": "edac", "sound_speed": 9.0, "diffusion_coefficient": 0.4}), 0.05, false),
+    ] {
+        let mut value = settings("midpoint");
+        (value["scheme"], value["wall_pressure"]) = (scheme, json!("linear"));
+        value["viscous_order"] = json!(2);
+        let settings = common::parse(&value);
+        let set = first_frame(&settings, box_of_fluid());
+        let (before, p, dt) = (set.particles.velocity.clone(), set.particles.pressure.clone(), TIME_STEP);
+        let stiffness = 0.5 * dt * settings.density * 81.0;
+        let divergence = |velocity: &[Vector<2>]| set.apply(Divergence(velocity));
+        let compressed = divergence(&before);
+        let middle = scalars(&set, |i| p[i] - stiffness * compressed[i]);
+        let pairs: Vec<_> = middle.iter().map(|&p| [p; 2]).collect();
+        let pushed = set.apply(GradientAndLaplacian(&pairs));
+        let viscous = derivatives(&settings, &set, &before);
+        let gravity = Vector::from_column_slice(&settings.body_force);
+        let velocity = vectors(&set, |i| {
+            let acceleration = viscous[i].0 * settings.kinematic_viscosity - pushed[i].0 / settings.density + gravity;
+            before[i] + acceleration * dt
+        });
+        let (again, gradient) = (divergence(&velocity), vectors(&set, |i| pushed[i].0));
+        let spread = divergence(&gradient);
+        let diffusivity = coefficient * settings.smoothing_length() * 9.0;
+        let after = stepped(&value, box_of_fluid(), 1);
+        for i in 0..after.real {
+            let diffusing = pushed[i].1 - if corrected { spread[i] } else { 0.0 };
+            let pressure = middle[i] - stiffness * again[i] + dt * diffusivity * diffusing;
+            assert_eq!(after.id[i], set.particles.id[i]);
+            assert_relative_eq!(after.velocity[i], velocity[i], epsilon = 1e-11);
+            assert_relative_eq!(after.pressure[i], pressure, epsilon = 1e-10);
+        }
+    }
+}
+
 /// Fluid at rest under an even pressure acts with that alone.
 #[test]
 fn at_rest_the_pressure_acts_as_it_is() {

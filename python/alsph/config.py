@@ -67,10 +67,8 @@ class Config:
         """About how many pairs of particles a run goes over: what the time that it takes is proportional to."""
         case = self.case
         neighbours = case.support_layers**case.space_dimensions
-        iteration = 8 if case.algorithm in (1, "original") else 4
-        passes = 5 + iteration * case.max_iterations + 2 * case.projection_sweeps
-        steps = self.until * case.resolution / case.largest_time_step
-        return float(case.particle_estimate() * neighbours * steps * passes)
+        steps = self.until * case.resolution / case.expected_time_step()
+        return float(case.particle_estimate() * neighbours * steps * case.passes)
 
     def tables(self) -> dict[str, Any]:
         """Return the content of the configuration file; what is not set is left out."""

@@ -9,8 +9,9 @@ use crate::frame::Frame;
 use crate::halo::Poison;
 use crate::particles::{ParticleKind, Particles};
 use crate::scheme::projection::{Projection, relaxation};
+use crate::scheme::viscous::sharpen;
 use crate::scheme::{Outcome, Scheme};
-use crate::settings::{DerivativeFrame, Settings, TimeStepLimits, VelocityLaplacian, WallPressure};
+use crate::settings::{DerivativeFrame, Eigenvalues, Settings, TimeStepLimits, VelocityLaplacian, WallPressure};
 use crate::shifting::measures_divergence;
 
 /// The fields of one step beside those of the particles, real particles and images.
@@ -51,8 +52,7 @@ impl<const D: usize> Poison for Derived<D> {
 pub struct Coefficients {
     /// r_AL of the step.
     penalty: f64,
-    /// λ_max Δx² of the compact Laplacian.
-    largest_eigenvalue: f64,
+    largest: Eigenvalues,
     /// σ of the projection sweeps, a length squared.
     pub relaxation: f64,
     /// The error of the compact Laplacian of a wave over its square wave number, a length squared.
@@ -63,26 +63,26 @@ pub struct Coefficients {
 
 impl Coefficients {
     fn new(settings: &Settings) -> Self {
-        let largest_eigenvalue = settings.largest_laplacian_eigenvalue();
+        let largest = settings.largest_eigenvalues();
         let area = settings.particle_spacing.powi(2);
         Self {
             penalty: f64::NAN,
-            largest_eigenvalue,
-            relaxation: relaxation(settings),
+            largest,
+            relaxation: relaxation(settings, largest),
             dispersion: settings.laplacian_dispersion() * area,
-            shortest: area / largest_eigenvalue,
+            shortest: area / largest.laplacian,
         }
     }
 }
 
 impl<const D: usize> Scheme<D> for Alsph<D> {
     fn limits(&self, settings: &Settings, velocity_max: f64) -> TimeStepLimits {
-        settings.time_step_limits(velocity_max, self.coefficients.largest_eigenvalue)
+        settings.time_step_limits(velocity_max, self.coefficients.largest)
     }
 
     fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> usize {
-        let largest_eigenvalue = self.coefficients.largest_eigenvalue;
-        self.coefficients.penalty = step.settings.penalty(step.velocity_max, step.time_step, largest_eigenvalue);
+        let largest = self.coefficients.largest.laplacian;
+        self.coefficients.penalty = step.settings.penalty(step.velocity_max, step.time_step, largest);
         self.begin(flow);
         self.velocity_derivatives(step, flow);
         self.begin_viscous_term(step, flow);
@@ -126,7 +126,7 @@ impl<const D: usize> Scheme<D> for Alsph<D> {
         particles.pressure[i] + penalty + self.projection.unkept(particles, i)
     }
 
-    fn penalty(&self) -> f64 {
+    fn penalty(&self, _: f64) -> f64 {
         self.coefficients.penalty
     }
 }
@@ -184,7 +184,7 @@ impl<const D: usize> Alsph<D> {
     /// What u^n gives of the viscous term.
     fn begin_viscous_term(&mut self, step: Step, flow: &mut Flow<D>) {
         if step.settings.viscous_order == 4 {
-            self.sharpen_laplacian(step, flow);
+            sharpen(step, flow, |i| self.derived[i].laplacian, self.coefficients.dispersion, &mut self.explicit);
         } else {
             self.explicit.clear();
         }
@@ -193,20 +193,6 @@ impl<const D: usize> Alsph<D> {
             self.explicit.resize(flow.particles.real, Vector::zeros());
             parallel::for_each(&mut self.explicit, |i, explicit| *explicit += derived[i].laplacian * share);
         }
-    }
-
-    /// The error of the compact Laplacian of a wave of wave number k is `dispersion` k² of it: take it off.
-    fn sharpen_laplacian(&mut self, step: Step, Flow { particles, frame, walls, .. }: &mut Flow<D>) {
-        let factor = self.coefficients.dispersion;
-        walls.sharpen(step.settings, particles, frame, |i| self.derived[i].laplacian, factor);
-        let dispersion = &walls.dispersion;
-        let count = particles.real;
-        frame.images.blank(&mut self.explicit, count);
-        frame.stencil.for_each_one(
-            LaplacianAndGradient { velocity: dispersion, seen: |s: usize, _: usize| dispersion[s] },
-            &mut self.explicit,
-            |_, (laplacian, _), out| *out = -laplacian,
-        );
     }
 
     /// u* (8), and ∇²p^m for (10), which reads the same neighbours.

@@ -2,13 +2,16 @@
 
 mod alsph;
 mod projection;
+mod viscous;
+mod weakly_compressible;
 
 use crate::base::parallel;
 use crate::flow::{Flow, Step};
 use crate::particles::{ParticleKind, Particles};
-use crate::settings::{Settings, TimeStepLimits};
+use crate::settings::{DensityDiffusion, SchemeSettings, Settings, TimeStepLimits};
 
 pub use alsph::{Alsph, Derived};
+pub use weakly_compressible::WeaklyCompressible;
 
 /// A scheme. What a step does beside it, from the search of neighbours to loads and shift, is the same for all.
 pub trait Scheme<const D: usize>: Send + Sync {
@@ -26,8 +29,22 @@ pub trait Scheme<const D: usize>: Send + Sync {
     /// What the velocity of the step had the gradient of.
     fn acting_pressure(&self, step: Step, particles: &Particles<D>, i: usize) -> f64;
 
-    /// r_AL of the last step; NaN for a scheme without a penalty.
-    fn penalty(&self) -> f64;
+    /// r_AL of a step so long: c² Δt, c being the speed of the waves by which the scheme keeps ∇·u small.
+    fn penalty(&self, time_step: f64) -> f64;
+}
+
+/// The scheme that the settings name.
+pub fn build<const D: usize>(settings: &Settings) -> Box<dyn Scheme<D>> {
+    match settings.scheme {
+        SchemeSettings::Alsph => Box::new(Alsph::new(settings)),
+        SchemeSettings::Wcsph { sound_speed, density_diffusion, diffusion_coefficient } => {
+            Box::new(WeaklyCompressible::new(settings, sound_speed, density_diffusion, diffusion_coefficient))
+        }
+        SchemeSettings::Edac { sound_speed, diffusion_coefficient } => {
+            let coefficient = diffusion_coefficient / 8.0;
+            Box::new(WeaklyCompressible::new(settings, sound_speed, DensityDiffusion::Molteni, coefficient))
+        }
+    }
 }
 
 /// How a step ended.

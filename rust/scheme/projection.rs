@@ -25,7 +25,7 @@ use crate::flow::{Flow, Step};
 use crate::particles::{ParticleKind, Particles};
 use crate::scheme::Derived;
 use crate::scheme::alsph::Coefficients;
-use crate::settings::{Settings, SweepPressure, SweepWeights};
+use crate::settings::{Eigenvalues, Settings, SweepPressure, SweepWeights};
 
 /// κ: the share of a sweep's potential that the pressure keeps. The rest of it is mostly noise of the one step; all of the
 /// pressure comes in over a few steps.
@@ -42,8 +42,8 @@ const CHEBYSHEV_DEGREE: usize = 4;
 const EIGENVALUE_MARGIN: f64 = 1.1;
 
 /// σ of the sweeps.
-pub fn relaxation(settings: &Settings) -> f64 {
-    settings.particle_spacing.powi(2) / (EIGENVALUE_MARGIN * settings.largest_projection_eigenvalue())
+pub fn relaxation(settings: &Settings, largest: Eigenvalues) -> f64 {
+    settings.particle_spacing.powi(2) / (EIGENVALUE_MARGIN * largest.projection)
 }
 
 #[derive(Debug, Default)]

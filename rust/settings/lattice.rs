@@ -3,7 +3,20 @@
 use super::Settings;
 use crate::kernel::{Smoothing, with_kernel};
 
+/// Largest eigenvalues on a square lattice, times Δx².
+#[derive(Clone, Copy, Debug)]
+pub struct Eigenvalues {
+    /// Of the negative compact Laplacian: λ_max.
+    pub laplacian: f64,
+    /// Of −∇·∇, the divergence of the gradient.
+    pub projection: f64,
+}
+
 impl Settings {
+    pub fn largest_eigenvalues(&self) -> Eigenvalues {
+        Eigenvalues { laplacian: self.largest_laplacian_eigenvalue(), projection: self.largest_projection_eigenvalue() }
+    }
+
     /// λ_max Δx²: the largest eigenvalue of the negative compact Laplacian on a square lattice, sought over the wave
     /// vectors of the Brillouin zone.
     pub fn largest_laplacian_eigenvalue(&self) -> f64 {

@@ -1,6 +1,9 @@
 //! The stability law of the time step, and the penalty that goes with it.
 
-use super::{Settings, WallVelocity};
+use super::{Eigenvalues, Settings, WallVelocity};
+
+/// c₀Δt over what a lattice's shortest waves bear.
+const ACOUSTIC_SHARE: f64 = 0.45;
 
 /// Upper bounds of Δt; infinite where one does not apply.
 #[derive(Clone, Copy, Debug)]
@@ -9,6 +12,8 @@ pub struct TimeStepLimits {
     pub courant: f64,
     /// r_AL Δt λ_max < 2 for a given C_BV (method section 3).
     pub penalty: f64,
+    /// A weakly compressible scheme's: (c₀ + u_max) Δt below a share of what a lattice's shortest waves bear, 2 Δx/√λ.
+    pub acoustic: f64,
     /// 0.125 h²/ν.
     pub viscous: f64,
     /// 0.25 sqrt(h/|g|).
@@ -17,14 +22,17 @@ pub struct TimeStepLimits {
 
 impl Settings {
     /// Stability limits for the largest velocity `velocity_max`.
-    pub fn time_step_limits(&self, velocity_max: f64, largest_eigenvalue: f64) -> TimeStepLimits {
+    pub fn time_step_limits(&self, velocity_max: f64, largest: Eigenvalues) -> TimeStepLimits {
         let gravity = self.body_force.iter().map(|g| g * g).sum::<f64>().sqrt();
         let h = self.smoothing_length();
         let spacing = self.particle_spacing;
-        let wave = |constant: f64| velocity_max * (constant * largest_eigenvalue / 2.0).sqrt();
+        let wave = |constant: f64| velocity_max * (constant * largest.laplacian / 2.0).sqrt();
         TimeStepLimits {
             courant: self.courant.map_or(f64::INFINITY, |courant| courant * spacing / velocity_max),
             penalty: self.penalty_constant.map_or(f64::INFINITY, |constant| spacing / wave(constant)),
+            acoustic: self.scheme.sound_speed().map_or(f64::INFINITY, |sound_speed| {
+                ACOUSTIC_SHARE * 2.0 * spacing / (largest.projection.sqrt() * (sound_speed + velocity_max))
+            }),
             viscous: self.viscous_limit() * h * h / self.kinematic_viscosity,
             body_force: 0.25 * (h / gravity).sqrt(),
         }

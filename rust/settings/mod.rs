@@ -12,8 +12,12 @@ mod rules;
 mod validation;
 
 pub use domain::{Body, Boundary, Domain};
+pub use lattice::Eigenvalues;
 pub use limits::TimeStepLimits;
-pub use rules::{DerivativeFrame, Shifting, SweepPressure, SweepWeights, VelocityLaplacian, WallPressure, WallVelocity};
+pub use rules::{
+    DensityDiffusion, DerivativeFrame, SchemeSettings, Shifting, SweepPressure, SweepWeights, VelocityLaplacian,
+    WallPressure, WallVelocity,
+};
 
 /// All that governs a simulation beside its particles. Any consistent units.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -44,6 +48,8 @@ pub struct Settings {
     pub velocity_limit: Option<f64>,
     /// Fraction of the penalty's stability law that an adaptive step uses for a given C_BV.
     pub time_step_safety: f64,
+    #[serde(default)]
+    pub scheme: SchemeSettings,
     pub derivative_frame: DerivativeFrame,
     /// Search the neighbours again in every iteration (Fatehi et al. 2019). Only with the updated frame.
     pub search_every_iteration: bool,

@@ -3,6 +3,51 @@
 use crate::base::Matrix;
 use serde::{Deserialize, Serialize};
 
+/// How velocity and pressure come from one step to the next, with the parameters that are the scheme's own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum SchemeSettings {
+    /// Augmented Lagrangian SPH.
+    #[default]
+    Alsph,
+    /// Weakly compressible SPH.
+    Wcsph {
+        /// c₀.
+        sound_speed: f64,
+        density_diffusion: DensityDiffusion,
+        /// δ.
+        diffusion_coefficient: f64,
+    },
+    /// Entropically damped artificial compressibility.
+    Edac {
+        /// c₀.
+        sound_speed: f64,
+        /// α.
+        diffusion_coefficient: f64,
+    },
+}
+
+impl SchemeSettings {
+    /// c₀ of a weakly compressible scheme.
+    pub fn sound_speed(&self) -> Option<f64> {
+        match *self {
+            Self::Alsph => None,
+            Self::Wcsph { sound_speed, .. } | Self::Edac { sound_speed, .. } => Some(sound_speed),
+        }
+    }
+}
+
+/// Diffusion of the density in weakly compressible SPH.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DensityDiffusion {
+    None,
+    /// δ h c₀ ∇²ρ (Molteni and Colagrossi 2009).
+    Molteni,
+    /// The same less that of the gradient, δ h c₀ (∇² − ∇·∇) ρ, which leaves a smooth field as it is (after Antuono et al. 2010).
+    Antuono,
+}
+
 /// At which positions the derivatives inside the iteration are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -1,6 +1,6 @@
 //! Checks of settings.
 
-use super::{Boundary, DerivativeFrame, Domain, Settings};
+use super::{Boundary, DerivativeFrame, Domain, SchemeSettings, Settings, VelocityLaplacian, WallPressure};
 use crate::base::error::{Result, setting};
 
 /// Iterations or sweeps of a step above which a number is a mistake: a step cannot be interrupted.
@@ -59,6 +59,7 @@ impl Settings {
         if self.search_every_iteration && self.derivative_frame != DerivativeFrame::Updated {
             return Err(setting("search_every_iteration", "needs derivative_frame = \"updated\""));
         }
+        self.validate_scheme()?;
         self.validate_vector("body_force", &self.body_force)?;
         for (k, body) in self.bodies.iter().enumerate() {
             if self.bodies[..k].iter().any(|other| other.name == body.name) {
@@ -68,6 +69,27 @@ impl Settings {
             self.validate_vector(&format!("bodies.{}.center", body.name), &body.center)?;
         }
         self.validate_domain()
+    }
+
+    fn validate_scheme(&self) -> Result<()> {
+        let (sound_speed, coefficient) = match self.scheme {
+            SchemeSettings::Alsph => return Ok(()),
+            SchemeSettings::Wcsph { sound_speed, diffusion_coefficient, .. }
+            | SchemeSettings::Edac { sound_speed, diffusion_coefficient } => (sound_speed, diffusion_coefficient),
+        };
+        if !(sound_speed.is_finite() && sound_speed > 0.0) {
+            return Err(setting("scheme.sound_speed", format!("must be a positive number, not {sound_speed}")));
+        }
+        if !(0.0..=1.0).contains(&coefficient) {
+            return Err(setting("scheme.diffusion_coefficient", format!("must lie in 0..1, not {coefficient}")));
+        }
+        if self.velocity_laplacian == VelocityLaplacian::Vector {
+            return Err(setting("velocity_laplacian", "must be \"scalar\" but in the scheme alsph"));
+        }
+        if self.wall_pressure == WallPressure::Paper {
+            return Err(setting("wall_pressure", "must be \"linear\" or \"adami\" but in the scheme alsph"));
+        }
+        Ok(())
     }
 
     fn validate_vector(&self, name: &str, vector: &[f64]) -> Result<()> {

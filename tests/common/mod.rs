@@ -16,6 +16,7 @@ pub fn settings_value<const D: usize>(particle_spacing: f64, boundary: &str) -> 
         "dimensions": D, "particle_spacing": particle_spacing, "smoothing_ratio": 4.0 / 3.0, "kernel": "quintic_spline",
         "density": 1.0, "kinematic_viscosity": 0.01, "body_force": vec![0.0; D],
         "time_step": 0.05 * particle_spacing, "adaptive_time_step": true, "time_step_safety": 0.9,
+        "scheme": {"kind": "alsph"},
         "derivative_frame": "initial", "search_every_iteration": false,
         "max_iterations": 5, "projection_sweeps": 0, "divergence_tolerance": 1e-3, "penalty_constant": 100.0,
         "courant": null, "viscous_theta": 1.0, "sweep_weights": "equal", "sweep_pressure": "rough",

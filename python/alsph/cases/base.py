@@ -186,6 +186,7 @@ class Case(Method):
             *remarks.boundary_layer(self.boundary_layer, self.particle_spacing),
             *(remarks.validated(self.reynolds, self.resolution, self.cell_reynolds, known) if known else []),
             *remarks.kernel(self.kernel, self.smoothing_ratio),
+            *remarks.scheme(self.scheme),
             *remarks.penalty(self.expected_penalty_constant()),
         ]
 
@@ -353,10 +354,12 @@ class Case(Method):
     def time_step_limits(self) -> dict[str, float]:
         """Return the bounds of ΔtU/Δx at the expected largest velocity; those that do not apply are infinite.
 
-        ``courant`` is the one asked for, ``penalty``, ``viscous`` and ``body_force`` are limits of stability.
+        ``courant`` is the one asked for, ``penalty``, ``acoustic``, ``viscous`` and ``body_force`` are limits of
+        stability.
         """
         limits = time_step_limits(self.settings(), self.velocity_max)
-        return {name: limits[name] / self.particle_spacing for name in ("courant", "penalty", "viscous", "body_force")}
+        names = ("courant", "penalty", "acoustic", "viscous", "body_force")
+        return {name: limits[name] / self.particle_spacing for name in names}
 
     def expected_time_step(self) -> float:
         """Return the time step at the expected largest velocity [Δx/U]."""
@@ -367,7 +370,9 @@ class Case(Method):
         return min(self.largest_time_step, *limits.values())
 
     def expected_penalty_constant(self) -> float:
-        """Return C_BV = (c/u_max)² at the expected largest velocity, c the penalty's speed of sound."""
+        """Return C_BV = (c/u_max)² at the expected largest velocity, c the speed of sound of penalty or scheme."""
+        if self.is_weakly_compressible:
+            return float((self.settings()["scheme"]["sound_speed"] / self.velocity_max) ** 2)
         if self.penalty_constant is not None:
             return self.penalty_constant
         largest = time_step_limits(self.settings(), self.velocity_max)["lambda_max"]

@@ -16,6 +16,9 @@ SUPPORT = {"quintic_spline": 3, "wendland_c2": 2, "wendland_c4": 2}
 COURANT = 0.3
 """Courant number where neither it nor the paper's pair is given."""
 
+SOUND_SPEED = 10.0
+"""Speed of sound of the weakly compressible schemes where none is given [U]: the density varies by 1 %."""
+
 PAPER = {"time_step": 0.0508, "penalty_constant": 100.0}
 """ΔtU/Δx and C_BV where only one of them is given."""
 
@@ -37,9 +40,30 @@ def superseded(changes: Mapping[str, Any]) -> tuple[str, ...]:
     return ("courant", *coefficient) if _as_in_the_paper(changes) else coefficient
 
 
-class Method(Parameters):
-    """How a flow is computed: time step, iterations, operators, shift and walls."""
+DIFFUSION = {"wcsph": 0.1, "edac": 0.5}
+"""Coefficient of each weakly compressible scheme's diffusion where none is given: δ of δ-SPH, α of EDAC."""
 
+
+class Method(Parameters):
+    """How a flow is computed: scheme, time step, iterations, operators, shift and walls."""
+
+    scheme: Literal["alsph", "wcsph", "edac"] | None = Field(
+        default=None,
+        description="augmented Lagrangian SPH, weakly compressible SPH, or entropically damped artificial "
+        "compressibility; alsph if not given",
+    )
+    sound_speed: float | None = Field(
+        default=None, gt=0, description="speed of sound of wcsph and edac, 10 if not given [U]"
+    )
+    density_diffusion: Literal["antuono", "molteni", "none"] | None = Field(
+        default=None, description="density diffusion of wcsph, antuono if not given"
+    )
+    diffusion_coefficient: float | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="δ of wcsph, 0.1 if not given, or α of edac, 0.5 if not given [-]",
+    )
     courant: float | None = Field(
         default=None,
         gt=0,
@@ -148,13 +172,59 @@ class Method(Parameters):
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")
             return values
+        if values.get("scheme") in DIFFUSION:
+            return values if values.get("time_step") is not None else values | {"courant": COURANT}
         if not _as_in_the_paper(values):
             return values | {"courant": COURANT}
         return values | {name: value for name, value in PAPER.items() if values.get(name) is None}
 
+    @model_validator(mode="before")
+    @classmethod
+    def _what_belongs_to_the_scheme(cls, values: dict[str, Any]) -> dict[str, Any]:
+        scheme = values.get("scheme") or "alsph"
+        own = {
+            "sound_speed": ("wcsph", "edac"),
+            "diffusion_coefficient": ("wcsph", "edac"),
+            "density_diffusion": ("wcsph",),
+            "penalty_constant": ("alsph",),
+        }
+        for name, schemes in own.items():
+            if values.get(name) is not None and scheme not in schemes:
+                raise ValueError(f"{name}: of the scheme {' or '.join(schemes)}, not of {scheme}; leave it out")
+        if scheme != "alsph" and values.get("algorithm") not in (None, "midpoint"):
+            raise ValueError(f"algorithm = {values['algorithm']!r}: of the scheme alsph, not of {scheme}; leave it out")
+        return values
+
     def replace(self, **changes: Any) -> Self:
         """Return a case with some parameters changed; see `superseded`."""
         return super().replace(**dict.fromkeys(superseded(changes)) | changes)
+
+    @property
+    def is_weakly_compressible(self) -> bool:
+        """Whether the fluid has a speed of sound, whatever the step."""
+        return self.scheme in DIFFUSION
+
+    def _scheme_settings(self) -> dict[str, Any]:
+        """Return the engine's settings of the scheme alone."""
+        if not self.is_weakly_compressible:
+            return {"kind": "alsph"}
+        given = self.diffusion_coefficient
+        settings: dict[str, Any] = {
+            "kind": self.scheme,
+            "sound_speed": self.sound_speed or SOUND_SPEED,
+            "diffusion_coefficient": DIFFUSION[self.scheme or ""] if given is None else given,
+        }
+        if self.scheme == "wcsph":
+            settings["density_diffusion"] = self.density_diffusion or "antuono"
+        return settings
+
+    @property
+    def passes(self) -> int:
+        """About how often a step goes over all pairs of particles."""
+        if self.is_weakly_compressible:
+            return 7
+        iteration = 8 if self.algorithm in (1, "original") else 4
+        return 5 + iteration * self.max_iterations + 2 * self.projection_sweeps
 
     @property
     def support_layers(self) -> int:
@@ -168,13 +238,14 @@ class Method(Parameters):
 
     def method_settings(self) -> dict[str, Any]:
         """Return those of the engine's settings that do not depend on the problem."""
-        follows = self.courant is not None
+        follows = self.courant is not None or self.is_weakly_compressible
         shared = (
             "smoothing_ratio kernel courant adaptive_time_step adaptive_until time_step_safety max_iterations "
             "projection_sweeps penalty_constant velocity_laplacian laplacian_correction viscous_order shifting "
             "shift_coefficient shift_limit wall_velocity wall_pressure"
         )
         return {name: getattr(self, name) for name in shared.split()} | {
+            "scheme": self._scheme_settings(),
             "viscous_theta": self.viscous_theta or (0.5 if follows else 1.0),
             "sweep_weights": self.sweep_weights or ("chebyshev" if follows else "equal"),
             "sweep_pressure": self.sweep_pressure or ("smooth" if follows else "rough"),

@@ -113,6 +113,13 @@ def kernel(name: str, smoothing_ratio: float) -> list[str]:
     return [f"kernel: {name} with h/Δx = {smoothing_ratio:.3g}; {found}"]
 
 
+def scheme(name: str | None) -> list[str]:
+    """Remark on a scheme with which hardly anything has been compared."""
+    if name in (None, "alsph"):
+        return []
+    return [f"other scheme: {name} has been compared with references in few flows, see docs/results.md, Other schemes"]
+
+
 def penalty(constant: float) -> list[str]:
     """Remark on a penalty constant C_BV too small for a fluid that hardly gives way."""
     mach = constant**-0.5

@@ -40,7 +40,7 @@ def bytes_per_particle(settings: dict[str, Any]) -> float:
 
 
 def time_step_limits(settings: dict[str, Any], velocity_max: float) -> dict[str, float]:
-    """Return the largest steps by ``courant``, ``penalty``, ``viscous``, ``body_force`` [D/U], and ``lambda_max``."""
+    """Return bounds of Δt, ``courant``, ``penalty``, ``acoustic``, ``viscous``, ``body_force`` [D/U], and λ_max."""
     with _translated():
         return _alsph.time_step_limits(json.dumps(settings), velocity_max)
 

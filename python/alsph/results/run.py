@@ -368,6 +368,8 @@ class Run:
         """How many iterations a step took, and how many it may take, in words."""
         case, iterations = self.config.case, self.history.get("iterations", np.empty(0))
         taken = f"{iterations.mean():.3g} of at most " if iterations.size else "at most "
+        if case.is_weakly_compressible:
+            return "1"
         return f"{taken}{case.max_iterations}, then {case.projection_sweeps} projection sweeps"
 
     def plot_forces(self, path: str | Path | None = None, body: str | None = None) -> Figure:
