@@ -44,7 +44,19 @@ pub struct Simulation<const D: usize> {
 
 impl<const D: usize> Simulation<D> {
     /// A simulation that goes on from `particles` (no images) and `clock`, on `threads` threads (all cores if none given).
-    pub fn new(settings: Settings, mut particles: Particles<D>, mut clock: Clock, threads: Option<usize>) -> Result<Self> {
+    pub fn new(settings: Settings, particles: Particles<D>, clock: Clock, threads: Option<usize>) -> Result<Self> {
+        let scheme = scheme::build(&settings);
+        Self::with_scheme(settings, particles, clock, threads, scheme)
+    }
+
+    /// The same with a scheme of the caller's in place of the one that the settings name.
+    pub fn with_scheme(
+        settings: Settings,
+        mut particles: Particles<D>,
+        mut clock: Clock,
+        threads: Option<usize>,
+        scheme: Box<dyn Scheme<D>>,
+    ) -> Result<Self> {
         if settings.dimensions != D {
             return Err(setting("dimensions", format!("{} does not fit {D}-dimensional arrays", settings.dimensions)));
         }
@@ -61,7 +73,7 @@ impl<const D: usize> Simulation<D> {
         clock.next_id = clock.next_id.max(particles.id.iter().max().map_or(0, |id| id + 1));
         Ok(Self {
             flow: Flow::new(&settings, particles),
-            scheme: scheme::build(&settings),
+            scheme,
             settings,
             clock,
             change: Vec::new(),
