@@ -1,4 +1,15 @@
-"""The cases, by name. A new case is one file and one entry here."""
+"""The cases, by name: those of alsph, one file and one entry here each, and those of other packages.
+
+A package adds a case by an entry point of the group ``alsph.cases``, with the name of the case::
+
+    [project.entry-points."alsph.cases"]  # in its pyproject.toml
+    heated = "my_package.heated:Heated"
+
+Then it is in the command line, in files, studies and run folders as any other.
+"""
+
+import warnings
+from importlib.metadata import entry_points
 
 from alsph.cases.backward_facing_step import BackwardFacingStep
 from alsph.cases.base import Case
@@ -32,6 +43,22 @@ __all__ = [
 ]
 
 
+def _add_installed() -> None:
+    """Add the cases of other packages; one that cannot be loaded, or has a name that is taken, is told and left out."""
+    for entry in entry_points(group="alsph.cases"):
+        try:
+            model = entry.load()
+            if not (isinstance(model, type) and issubclass(model, Case) and model.name == entry.name):
+                raise TypeError(f"{entry.value} is no case class whose `name` is '{entry.name}'")
+            if CASES.setdefault(entry.name, model) is not model:
+                raise ValueError("there is a case of this name")
+        except Exception as error:  # whatever another package does wrong
+            warnings.warn(f"case '{entry.name}' of {entry.value} is left out: {error}", RuntimeWarning, stacklevel=2)
+
+
+_add_installed()
+
+
 def find(name: str) -> type[Case]:
     """Return the case with that name.
 
@@ -41,6 +68,6 @@ def find(name: str) -> type[Case]:
         If there is none.
     """
     if name not in CASES:
-        own = "a case of your own must be put into alsph.cases.CASES before"
+        own = "a case of your own must be put into alsph.cases.CASES before, or be an entry point of its package"
         raise ConfigError(f"unknown case '{name}'; {suggest(name, CASES)} ({own})")
     return CASES[name]
