@@ -172,7 +172,7 @@ class Method(Parameters):
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")
             return values
-        if values.get("scheme") in DIFFUSION:
+        if values.get("scheme") in tuple(DIFFUSION):  # it may be anything
             return values if values.get("time_step") is not None else values | {"courant": COURANT}
         if not _as_in_the_paper(values):
             return values | {"courant": COURANT}
@@ -182,6 +182,8 @@ class Method(Parameters):
     @classmethod
     def _what_belongs_to_the_scheme(cls, values: dict[str, Any]) -> dict[str, Any]:
         scheme = values.get("scheme") or "alsph"
+        if scheme not in ("alsph", *DIFFUSION):
+            return values  # its own check refuses it
         own = {
             "sound_speed": ("wcsph", "edac"),
             "diffusion_coefficient": ("wcsph", "edac"),
