@@ -8,7 +8,7 @@ use crate::frame::Frame;
 use crate::kernel::{Smoothing, with_kernel};
 use crate::neighbours::Entry;
 use crate::particles::{ParticleKind, Particles};
-use crate::settings::{Settings, WallVelocity};
+use crate::settings::{Settings, WallPressure, WallVelocity};
 use rayon::prelude::*;
 
 /// Largest ratio of the distances of solid and fluid from the surface: β_max − 1 of Morris, Fox and Zhu (1997).
@@ -167,6 +167,20 @@ pub fn extrapolate<const D: usize>(
         extrapolated.into_iter().for_each(|(i, value)| real[i] = value);
         frame.images.scalars(field);
     }
+}
+
+/// The pressure of solid particles: the Shepard average of the fluid's, with the hydrostatic term (Adami, Hu and Adams 2012, eq. 27; bodies
+/// do not accelerate) or continued along its `gradient`, which only the rule [`WallPressure::Linear`] reads.
+pub fn extrapolate_pressure<const D: usize>(
+    settings: &Settings,
+    frame: &Frame<D>,
+    Particles { real, kind, pressure, .. }: &mut Particles<D>,
+    gradient: &[Vector<D>],
+) {
+    let hydrostatic = Vector::<D>::from_column_slice(&settings.body_force) * settings.density;
+    let slope = |j: usize| if settings.wall_pressure == WallPressure::Linear { gradient[j] } else { hydrostatic };
+    let continued = |pressure: &[f64], j: usize, r_ij: Vector<D>| pressure[j] + slope(j).dot(&r_ij);
+    extrapolate(settings, frame, &kind[..*real], pressure, continued);
 }
 
 /// `f(j, W_ij, r_ij)` for those of the neighbours `near` of particle `i`, each with how much is seen of it, a factor of W, that are in its

@@ -2,10 +2,9 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
-use crate::boundary::{deep_in_inlet, extrapolate};
+use crate::boundary::{deep_in_inlet, extrapolate_pressure};
 use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, vector_laplacian};
 use crate::flow::{Flow, Step};
-use crate::frame::Frame;
 use crate::halo::Poison;
 use crate::particles::{ParticleKind, Particles};
 use crate::scheme::projection::{Projection, relaxation};
@@ -256,21 +255,8 @@ impl<const D: usize> Alsph<D> {
         if paper_walls {
             frame.images.scalars(pressure);
         } else {
-            self.extrapolate_wall_pressure(settings, particles, frame);
+            extrapolate_pressure(settings, frame, particles, &self.pressure_gradient);
         }
-    }
-
-    /// The pressure of solid particles: the Shepard average of the fluid's, with the hydrostatic term (Adami, Hu and Adams 2012,
-    /// eq. 27; bodies do not accelerate) or continued along its gradient.
-    fn extrapolate_wall_pressure(&self, settings: &Settings, particles: &mut Particles<D>, frame: &Frame<D>) {
-        let gravity = Vector::<D>::from_column_slice(&settings.body_force);
-        let Particles { real, kind, pressure, .. } = particles;
-        let gradient = |j: usize| match settings.wall_pressure {
-            WallPressure::Linear => self.pressure_gradient[j],
-            _ => gravity * settings.density,
-        };
-        let continued = |pressure: &[f64], j: usize, r_ij: Vector<D>| pressure[j] + gradient(j).dot(&r_ij);
-        extrapolate(settings, frame, &kind[..*real], pressure, continued);
     }
 
     /// u^{m+1} (11). Buffers and solids keep their velocities.

@@ -12,7 +12,7 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
-use crate::boundary::{deep_in_inlet, extrapolate};
+use crate::boundary::{deep_in_inlet, extrapolate_pressure};
 use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient};
 use crate::flow::{Flow, Step};
 use crate::particles::{ParticleKind, Particles};
@@ -95,21 +95,16 @@ impl<const D: usize> WeaklyCompressible<D> {
         });
     }
 
-    /// The pressure of solid particles: the Shepard average of the fluid's, with the hydrostatic term or continued along its gradient.
+    /// The pressure that solids show.
     fn extrapolate_wall_pressure(&mut self, settings: &Settings, Flow { particles, frame, .. }: &mut Flow<D>) {
         frame.images.scalars(&mut particles.pressure);
-        let linear = settings.wall_pressure == WallPressure::Linear;
-        if linear {
+        if settings.wall_pressure == WallPressure::Linear {
             let gradient = &mut self.near_walls;
             frame.images.blank(gradient, particles.len());
             frame.stencil.evaluate_near_solids(Gradient(&particles.pressure), frame.images.real(gradient));
             frame.images.vectors(gradient);
         }
-        let hydrostatic = Vector::<D>::from_column_slice(&settings.body_force) * settings.density;
-        let gradient = |j: usize| if linear { self.near_walls[j] } else { hydrostatic };
-        let Particles { real, kind, pressure, .. } = particles;
-        let continued = |pressure: &[f64], j: usize, r_ij: Vector<D>| pressure[j] + gradient(j).dot(&r_ij);
-        extrapolate(settings, frame, &kind[..*real], pressure, continued);
+        extrapolate_pressure(settings, frame, particles, &self.near_walls);
     }
 
     /// u^{n+1} by the pressure in the middle of the step. Buffers and solids keep their velocities.

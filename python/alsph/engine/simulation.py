@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from alsph import _alsph
+import alsph._alsph as _alsph
 from alsph.arrays import FloatArray
 from alsph.engine.inflow import Inflow, Prescription, backflow
 from alsph.engine.problem import Problem
