@@ -89,6 +89,16 @@ class Ledger:
         )
 
 
+def mach_number(history: dict[str, FloatArray]) -> float:
+    """Return u_max over the speed of sound c = √(r_AL/Δt), averaged over the steps; NaN where they do not tell."""
+    names = ("velocity_max", "time_step", "penalty_coefficient")
+    if not all(name in history for name in names):
+        return np.nan
+    fastest, step, penalty = (history[name] for name in names)
+    moving = penalty > 0
+    return float(np.mean(fastest[moving] * np.sqrt(step[moving] / penalty[moving]))) if moving.any() else np.nan
+
+
 def _open(case: Case) -> bool:
     """Whether fluid enters or leaves through a boundary."""
     return any(side in ("inlet", "outlet") for pair in case.domain()["boundaries"] for side in pair)

@@ -23,8 +23,8 @@ from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
 from alsph.folder.run_folder import RunFolder
 from alsph.geometry.particles import Snapshot
-from alsph.parameters import choose
-from alsph.results.ledger import Ledger
+from alsph.parameters import checked_point, choose
+from alsph.results.ledger import Ledger, mach_number
 from alsph.results.outcome import outcome
 from alsph.text import duration, in_figure, printable, shown
 
@@ -216,7 +216,7 @@ class Run:
         """
         case = self.config.case
         names, parts = self._chosen(body, part)
-        point = case.moment_point if about is None else _point("about", about)
+        point = case.moment_point if about is None else checked_point("about", about)
         centres = {each["name"]: each["center"] for each in case.bodies()}
         missing = np.full(len(self.history["time"]), np.nan)
         moment = np.zeros_like(missing)
@@ -346,7 +346,7 @@ class Run:
             results["shedding periods"] = self.window.periods
         results["mean velocity divergence, |∇·u| D/U"] = self.divergence.mean
         results["largest velocity divergence, |∇·u| D/U"] = self.divergence.max
-        results["artificial Mach number of the penalty"] = Estimate(self._mach_number())
+        results["artificial Mach number of the penalty"] = Estimate(mach_number(self.history))
         for measure in self.measures:
             value = measure.value
             results[measure.name] = value if isinstance(value, Estimate) else Estimate(value)
@@ -354,15 +354,6 @@ class Run:
                 results[f"{measure.name}, reference"] = Estimate(measure.reference)
         results |= {f"remark {number}": remark for number, remark in enumerate(self.remarks, 1)}
         return {name: value for name, value in results.items() if value != ""}
-
-    def _mach_number(self) -> float:
-        """u_max over the penalty's speed of sound c = √(r_AL/Δt), averaged over the run."""
-        names = ("velocity_max", "time_step", "penalty_coefficient")
-        if not all(name in self.history for name in names):
-            return np.nan
-        fastest, step, penalty = (self.history[name] for name in names)
-        moving = penalty > 0
-        return float(np.mean(fastest[moving] * np.sqrt(step[moving] / penalty[moving]))) if moving.any() else np.nan
 
     def _iterations(self) -> str:
         """How many iterations a step took, and how many it may take, in words."""
@@ -452,14 +443,3 @@ def _plotting() -> ModuleType:
     from alsph import plotting
 
     return plotting
-
-
-def _point(name: str, value: Sequence[float]) -> FloatArray:
-    """Return a point (2,) that was given by its two coordinates."""
-    try:
-        point = np.array(value, float)
-    except (TypeError, ValueError):
-        point = np.empty(0)
-    if point.shape != (2,) or not np.isfinite(point).all():
-        raise ConfigError(f"{name} = {shown(value)}: must be two numbers, x and y [D]")
-    return point
