@@ -1,4 +1,4 @@
-"""The driver of a run: stepping, output schedule, checkpoints, and how a run may end."""
+"""How a run begins, goes on and is completed in its folder."""
 
 import math
 import warnings
