@@ -4,6 +4,7 @@ import sys
 import pytest
 from alsph import config, open_run
 from alsph.cases import CASES
+from alsph.cli.app import COMMANDS
 
 COMMAND = [sys.executable, "-c", "from alsph.cli import main; main()"]
 
@@ -43,11 +44,32 @@ def test_end_to_end(alsph, tmp_path, small_options):
     assert open_run(run).history["time"][-1] < 0.04
 
 
-def test_commands_load_scipy_and_matplotlib_only_where_they_use_them():
-    """Half a second each, which help, a completion or a mistyped option must not take."""
-    program = "import sys, alsph.cli; print([name for name in sys.modules if name in ('matplotlib', 'scipy')])"
+LIBRARIES = ("numpy", "pydantic", "h5py", "shapely", "rich", "scipy", "matplotlib")
+
+
+@pytest.mark.parametrize(
+    ("program", "loaded"),
+    [
+        ("import alsph, alsph.cli", ()),
+        ("import alsph.cli.of_cases, alsph.cli.runs, alsph.cli.studies", LIBRARIES[:5]),
+    ],
+)
+def test_what_is_not_used_is_not_loaded(program, loaded):
+    """Half a second and more, which help, a completion or a mistyped option must not take."""
+    program += f"; import sys; print([name for name in {LIBRARIES} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    assert done.stdout.strip() == str(list(loaded))
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_list_of_commands_says_what_each_says_of_itself(alsph, name):
+    code, stdout, _ = alsph(name, "--help")
+    assert (code, COMMANDS[name][1].removesuffix(".") in " ".join(stdout.split())) == (0, True)
+
+
+def test_a_mistyped_command_is_guessed(alsph):
+    code, _, stderr = alsph("resum", "folder")
+    assert (code, "Did you mean 'resume'" in stderr) == (2, True)
 
 
 def test_configuration_file_with_options_on_top(alsph, tmp_path):

@@ -66,7 +66,8 @@ PYTHON_FLOORS = (
     ("results",),
     ("plotting", "running"),
     ("study",),
-    ("cli", "__init__"),
+    ("__init__",),
+    ("cli",),
 )
 PYTHON_FLOOR = {name: height for height, names in enumerate(PYTHON_FLOORS) for name in names}
 

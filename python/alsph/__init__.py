@@ -7,6 +7,8 @@ Examples
 >>> run = case.run("runs/re200", until=60, threads=2)  # doctest: +SKIP
 """
 
+import lazy_loader
+
 try:
     from alsph._alsph import __version__
 except ImportError as error:
@@ -15,29 +17,5 @@ except ImportError as error:
         f"`maturin develop --release` for development, or `pip install .` to install it [{error}]"
     ) from error
 
-from alsph import cases, errors, study
-from alsph.engine.simulation import Simulation
-from alsph.results.run import Run
-from alsph.running.repetition import repeat
-from alsph.running.start import resume
-from alsph.study.autotune import autotune
-from alsph.study.convergence import converge
-from alsph.study.validation import validate
-
-open_run = Run
-"""Open a run folder: ``alsph.open_run("runs/re200")``."""
-
-__all__ = [
-    "Run",
-    "Simulation",
-    "__version__",
-    "autotune",
-    "cases",
-    "converge",
-    "errors",
-    "open_run",
-    "repeat",
-    "resume",
-    "study",
-    "validate",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__all__ += ["__version__"]

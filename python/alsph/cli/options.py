@@ -9,25 +9,13 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import typer
 from typer.core import TyperGroup
+from typer.main import get_command
 
 from alsph import cases, config
 from alsph.cli.terminal import exit_codes
 from alsph.config import Config, RunSettings
 from alsph.parameters import Parameters, describe_default
 from alsph.text import shown
-
-
-class CaseGroup(TyperGroup):
-    """Commands named after the cases; the name of a TOML file stands for the case in it, with its parameters."""
-
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return the command of a case, or of the case in a file."""
-        with exit_codes():
-            if cmd_name.endswith(".toml"):
-                ctx.obj = config.load(cmd_name)
-                cmd_name = ctx.obj.case.name
-            return super().get_command(ctx, cases.find(cmd_name).name)
-
 
 StudyName = Annotated[str, typer.Argument(metavar="NAME|FILE.toml", help="study: see alsph study list")]
 
@@ -56,7 +44,7 @@ METAVARS = {int: "INTEGER", float: "FLOAT"}
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="run folder")]
 
 
-def case_command(model: type[cases.Case], action: Callable[..., None]) -> Callable[..., None]:
+def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Callable[..., None]:
     """Return a command for a case: `action` called with the configuration that the options make."""
     own = list(inspect.signature(action).parameters.values())[1:]
 
@@ -85,6 +73,33 @@ def case_command(model: type[cases.Case], action: Callable[..., None]) -> Callab
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return command
+
+
+class CaseGroup(TyperGroup):
+    """Commands named after the cases; the name of a TOML file stands for the case in it, with its parameters."""
+
+    action: Callable[..., None]
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of the cases."""
+        return list(cases.CASES)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return the command of a case, or of the case in a file."""
+        with exit_codes():
+            if cmd_name.endswith(".toml"):
+                ctx.obj = config.load(cmd_name)
+                cmd_name = ctx.obj.case.name
+            model = cases.find(cmd_name)
+        app = typer.Typer(add_completion=False, rich_markup_mode=None)
+        text = (model.__doc__ or "").split("\n\nParameters\n")[0]
+        app.command(model.name, help=text, short_help=model.title)(_case_command(model, self.action))
+        return get_command(app)
+
+
+def group_of_cases(action: Callable[..., None]) -> type[CaseGroup]:
+    """Return a group of commands, one a case: `action` called with the configuration that the options make."""
+    return type("Cases", (CaseGroup,), {"action": staticmethod(action)})
 
 
 def _options(model: type[Parameters], names: Iterable[str], defaults: Mapping[str, str]) -> Iterator[inspect.Parameter]:

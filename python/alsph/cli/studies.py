@@ -1,4 +1,4 @@
-"""The commands of alsph study."""
+"""The commands of several runs: study and validate."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +12,7 @@ from alsph.cli.options import Jobs, Preset, Scheduler, StudyName, StudyOutput, W
 from alsph.cli.terminal import complain, exit_codes, say, say_table
 from alsph.running.control import seconds_of
 from alsph.study.board import overview
+from alsph.study.validation import validate
 from alsph.text import printable
 
 
@@ -25,6 +26,7 @@ class StudyGroup(TyperGroup):
         return super().parse_args(ctx, args)
 
 
+app = typer.Typer(add_completion=False)
 study_app = typer.Typer(
     cls=StudyGroup,
     no_args_is_help=True,
@@ -32,6 +34,9 @@ study_app = typer.Typer(
     help="Run a parameter study, draw its figures and write its tables.",
     epilog="alsph study NAME stands for alsph study run NAME. Start with: alsph study list",
 )
+
+
+app.add_typer(study_app, name="study")
 
 
 @study_app.command("run")
@@ -85,6 +90,29 @@ def _study_draw(name: StudyName, preset: Preset = None, output: StudyOutput = Pa
 def _study_list() -> None:
     """List the studies that come with alsph."""
     say_table([(name, study.load(name).title) for name in study.shipped()])
+
+
+@app.command("validate")
+@exit_codes()
+def _validate(
+    names: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="cases; all if none is given")] = None,
+    full: Annotated[bool, typer.Option("--full/--quick", help="hours, or minutes, on two cores")] = False,
+    resolution: Annotated[
+        list[int] | None, typer.Option(help="resolution D/Δx, may be repeated", show_default="those of the suite")
+    ] = None,
+    threads: Annotated[int | None, typer.Option(help="number of threads", show_default="all cores")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="folder for runs and report")] = Path(
+        "runs/validation"
+    ),
+) -> None:
+    """Run cases at several resolutions and compare them with their references.
+
+    The exit code is 1 if a check fails. Runs are kept in the output folder and used again; a validation that was cut
+    goes on when it is started again.
+    """
+    report = validate(*(names or ()), full=full, resolutions=resolution or (), threads=threads, output=output)
+    say(f"\n{report}\n{report.path / 'report.md'}")
+    raise typer.Exit(not report.passed)
 
 
 def _print_results(results: study.Results) -> None:

@@ -443,3 +443,7 @@ def _plotting() -> ModuleType:
     from alsph import plotting
 
     return plotting
+
+
+open_run = Run
+"""Open a run folder: ``alsph.open_run("runs/re200")``."""

@@ -1,0 +1,51 @@
+"""What ``import alsph`` offers; each is loaded when it is used first."""
+
+from . import (
+    analysis,
+    cases,
+    config,
+    engine,
+    errors,
+    folder,
+    geometry,
+    parameters,
+    plotting,
+    reference,
+    results,
+    running,
+    study,
+)
+from .engine.simulation import Simulation
+from .results.run import Run, open_run
+from .running.repetition import repeat
+from .running.start import resume
+from .study.autotune import autotune
+from .study.convergence import converge
+from .study.validation import validate
+
+__version__: str
+
+__all__ = [
+    "Run",
+    "Simulation",
+    "__version__",
+    "autotune",
+    "cases",
+    "converge",
+    "errors",
+    "open_run",
+    "repeat",
+    "resume",
+    "study",
+    "validate",
+    "analysis",
+    "config",
+    "engine",
+    "folder",
+    "geometry",
+    "parameters",
+    "plotting",
+    "reference",
+    "results",
+    "running",
+]

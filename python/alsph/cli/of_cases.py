@@ -1,0 +1,98 @@
+"""The commands of a case, or of a file with one: run, describe, autotune and converge; and the list of the cases."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from alsph import cases
+from alsph.cli.options import Jobs, Retry, Scheduler, StudyOutput, Walltime, group_of_cases
+from alsph.cli.runs import say_run
+from alsph.cli.terminal import say, say_table
+from alsph.config import Config
+from alsph.errors import ConfigError
+from alsph.running.control import Control, seconds_of
+from alsph.running.describe import describe
+from alsph.running.start import start
+from alsph.study.autotune import autotune
+from alsph.study.convergence import converge
+
+
+def _run(
+    configuration: Config,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="run folder", show_default="runs/CASE")] = None,
+    force: Annotated[bool, typer.Option("--force", help="replace an existing run folder")] = False,
+    walltime: Walltime = None,
+    retry: Retry = 0,
+) -> None:
+    control = Control(walltime=seconds_of(walltime), retry=retry)
+    say_run(start(configuration, output or Path("runs") / configuration.case.name, control, force=force))
+
+
+def _describe(
+    configuration: Config,
+    probe: Annotated[bool, typer.Option(help="take a few steps to estimate the time")] = True,
+) -> None:
+    say_table(describe(configuration, probe=probe))
+
+
+def _autotune(
+    configuration: Config,
+    divergence: Annotated[float, typer.Option(help="mean |∇·u| that is good enough [U/D]")] = 1e-3,
+    develop: Annotated[float, typer.Option(help="time for which the flow is developed first [D/U]")] = 3.0,
+    probe: Annotated[float, typer.Option(help="length of each probe [D/U]")] = 1.0,
+    margin: Annotated[float, typer.Option(help="fraction of the largest stable step that is used [-]")] = 0.9,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="folder for report and case", show_default="runs/autotune/CASE"),
+    ] = None,
+) -> None:
+    folder = output or Path("runs/autotune") / configuration.case.name
+    tuning = autotune(
+        configuration.case, divergence, develop=develop, probe=probe, margin=margin, threads=configuration.run.threads
+    )
+    tuning.save(folder)
+    say(f"\n{tuning}\n\nalsph run {folder / 'case.toml'}")
+
+
+def _converge(
+    configuration: Config,
+    resolutions: Annotated[str, typer.Option(help="three or more resolutions D/Δx, as 10,14,20")] = "10,14,20",
+    jobs: Jobs = None,
+    output: StudyOutput = Path("runs/studies"),
+    scheduler: Scheduler = None,
+) -> None:
+    try:
+        ladder = [int(text) for text in resolutions.split(",")]
+    except ValueError:
+        raise ConfigError(f"resolutions = {resolutions!r}: must be whole numbers with commas, as 10,14,20") from None
+    threads = configuration.run.threads or 1
+    report = converge(configuration, ladder, output, jobs=jobs, threads=threads, scheduler=scheduler)
+    say(f"\n{report}\n{report.path / 'convergence.md'}")
+    raise typer.Exit(not report.results.complete)
+
+
+app = typer.Typer(add_completion=False)
+EPILOG = "The options are the parameters of the case: see CASE --help. They override those of a file."
+for _name, _action, _help in (
+    ("run", _run, "Run a case, or a file, into a run folder."),
+    ("describe", _describe, "Tell beforehand what a run will take."),
+    ("autotune", _autotune, "Find the largest stable time step and the cheapest iterations."),
+    ("converge", _converge, "Run a case at several resolutions and judge its convergence."),
+):
+    app.add_typer(
+        typer.Typer(
+            cls=group_of_cases(_action),
+            help=_help,
+            no_args_is_help=True,
+            subcommand_metavar="CASE|FILE.toml [OPTIONS]",
+            epilog=EPILOG,
+        ),
+        name=_name,
+    )
+
+
+@app.command("cases")
+def _cases() -> None:
+    """List the cases."""
+    say_table([(name, model.title) for name, model in cases.CASES.items()])

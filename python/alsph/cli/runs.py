@@ -1,0 +1,98 @@
+"""The commands of a run folder: resume, repeat, info and plot."""
+
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from alsph import plotting
+from alsph.cli.options import Retry, RunPath, Threads, Walltime
+from alsph.cli.terminal import complain, exit_codes, say, say_table
+from alsph.folder.durable import check_folder
+from alsph.results.run import Run
+from alsph.running.control import seconds_of
+from alsph.running.repetition import repeat
+from alsph.running.start import resume
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command("resume")
+@exit_codes()
+def _resume(
+    path: RunPath,
+    until: Annotated[float | None, typer.Option(help="new end time [D/U]", show_default="the run's")] = None,
+    threads: Threads = None,
+    walltime: Walltime = None,
+    retry: Retry = 0,
+) -> None:
+    """Go on with a run from its newest sound checkpoint; one that has reached its end stays as it is."""
+    say_run(resume(path, until, threads, walltime=seconds_of(walltime), retry=retry))
+
+
+@app.command("repeat")
+@exit_codes()
+def _repeat(path: RunPath, threads: Threads = None) -> None:
+    """Repeat a run from its start, without writing anything, and compare it bit by bit.
+
+    The exit code is 1 if it is not the same.
+    """
+    repetition = repeat(path, threads)
+    say(repetition)
+    raise typer.Exit(not repetition.same)
+
+
+@app.command("info")
+@exit_codes()
+def _info(path: RunPath) -> None:
+    """Tell the state and the results of a run."""
+    say_run(Run(path))
+
+
+@app.command("plot")
+@exit_codes()
+def _plot(
+    path: RunPath,
+    field: Annotated[
+        list[str] | None,
+        typer.Option(help="field to draw, may be repeated", show_default="vorticity and pressure; none in 3-D"),
+    ] = None,
+    time: Annotated[float | None, typer.Option(help="time of the fields [D/U]", show_default="the last")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="folder for the figures", show_default="RUN/figures")
+    ] = None,
+) -> None:
+    """Draw the figures of a run.
+
+    These are the ledger of the run, its curves beside their reference, forces and their spectra,
+    pressure coefficient, and fields.
+    """
+    run = Run(path)
+    field = field or ([] if run.case.get("dimensions") == 3 else ["vorticity", "pressure"])
+    for name in field:
+        plotting.field_style(name)
+    figures = output or path / "figures"
+    drawings: dict[str, Callable[[Path], object]] = {
+        profile.file_name: functools.partial(run.plot_profile, profile) for profile in run.profiles
+    }
+    drawings["ledger"] = run.plot_ledger
+    if run.body:
+        drawings |= {"forces": run.plot_forces, "spectrum": run.plot_spectrum}
+    if run.config.case.surface_points():
+        drawings["pressure_coefficient"] = run.plot_pressure_coefficient
+    drawings |= {name: functools.partial(run.plot_field, name, time) for name in field}
+    if not output:
+        check_folder(figures)
+    figures.mkdir(parents=True, exist_ok=True)
+    if time is not None and field:
+        complain(f"fields at t* = {run.snapshot(time).time:.6g}, the output nearest to {time:g}")
+    for name, draw in drawings.items():
+        draw(figures / f"{name}.png")
+        say(figures / f"{name}.png")
+
+
+def say_run(run: Run) -> None:
+    """Print the summary of a run."""
+    say_table([("run folder", str(run.path))] + [(name, str(value)) for name, value in run.summary().items()])
