@@ -254,7 +254,7 @@ fn main() {
             operations: 0.0,
             numbers: 0,
             work: Box::new(|| {
-                again.stencil.evaluate(&settings, &particles, |volume| again.images.scalars(volume));
+                again.stencil.evaluate(&settings, &particles, |volume| again.images.fill(volume));
                 again.stencil.correct();
             }),
         },

@@ -70,7 +70,7 @@ impl<const D: usize> Flow<D> {
                 *r = before.position[i] + velocity * (0.5 * step.time_step);
             }
         });
-        frame.images.positions(&mut position);
+        frame.images.fill_positions(&mut position);
         particles.position = position;
     }
 }

@@ -74,7 +74,7 @@ impl<const D: usize> Frame<D> {
                     *r += particles.velocity[i] * (travel.fraction * travel.time_step);
                 }
             });
-            self.images.positions(&mut position);
+            self.images.fill_positions(&mut position);
             particles.position = position;
         }
         self.expected.clear();
@@ -117,7 +117,7 @@ impl<const D: usize> Frame<D> {
             faces.share_out(particles, cluster, entries, out);
         });
         images.blank(&mut self.stencil.volume, particles.len());
-        self.stencil.evaluate(settings, particles, |volume| images.scalars(volume));
+        self.stencil.evaluate(settings, particles, |volume| images.fill(volume));
     }
 }
 

@@ -44,7 +44,7 @@ impl Scheme<2> for Diffusion {
         for i in (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Fluid) {
             particles.velocity[i] += self.laplacian[i] * factor;
         }
-        frame.images.vectors(&mut particles.velocity);
+        frame.images.fill(&mut particles.velocity);
         1
     }
 

@@ -100,7 +100,7 @@ fn check_moved(points: Vec<Vector<2>>, boundary: &str, speed: f64, deviation: f6
     for i in 0..particles.real {
         particles.position[i] += particles.velocity[i] + direction(2.5 * i as f64) * (deviation * speed);
     }
-    frame.images.positions(&mut particles.position);
+    frame.images.fill_positions(&mut particles.position);
     frame.update(&settings, &particles);
     let radius = settings.support_radius();
     let expected = brute_force_neighbours(&particles.position, particles.real, radius);

@@ -1,9 +1,10 @@
 //! What happens at the sides of the domain, and the images beyond them.
 
-use alsph::boundary::{deep_in_inlet, end_step};
+use alsph::boundary::{PressureRule, VelocityRule, conditions, end_step};
 use alsph::halo::Images;
 use alsph::neighbours::Grid;
-use alsph::{ParticleKind, Particles, Vector};
+use alsph::settings::WallPressure;
+use alsph::{ParticleKind, Particles, Settings, Vector};
 use approx::assert_relative_eq;
 use serde_json::{Value, json};
 
@@ -116,13 +117,30 @@ fn a_refilled_particle_has_the_pressure_of_the_nearest_inlet_particle() {
 #[test]
 fn deep_in_an_inlet_is_a_support_radius_beyond_its_plane() {
     let settings = common::parse(&box_between(json!([["inlet", "outlet"], ["inlet", "none"]])));
-    let (deep, radius) = (deep_in_inlet(&settings), settings.support_radius());
-    let inlet = |x: f64, y: f64| deep(ParticleKind::Inlet, &Vector::from([x, y]));
+    let (condition, radius) = (conditions(&settings), settings.support_radius());
+    let deep =
+        |kind, x: f64, y: f64| condition(kind, &Vector::from([x, y])).pressure == PressureRule::SolvedWithoutDivergence;
+    let inlet = |x: f64, y: f64| deep(ParticleKind::Inlet, x, y);
     assert!(inlet(-1.0 - 1.01 * radius, 1.0) && !inlet(-1.0 - 0.99 * radius, 1.0) && !inlet(0.0, 1.0));
     assert!(inlet(0.0, 0.5 - 1.01 * radius) && !inlet(0.0, 0.5 - 0.99 * radius));
-    assert!(!deep(ParticleKind::Fluid, &Vector::from([-9.0, 1.0])) && !inlet(9.0, 1.0));
+    assert!(!deep(ParticleKind::Fluid, -9.0, 1.0) && !inlet(9.0, 1.0));
     let closed = common::parse(&box_between(json!([["none", "outlet"], ["slip", "slip"]])));
-    assert!(!deep_in_inlet(&closed)(ParticleKind::Inlet, &Vector::from([-9.0, 1.0])));
+    let rule = conditions(&closed)(ParticleKind::Inlet, &Vector::from([-9.0, 1.0])).pressure;
+    assert_eq!(rule, PressureRule::Solved);
+}
+
+#[test]
+fn what_a_particle_obeys_follows_from_its_kind() {
+    let sides = json!([["inlet", "outlet"], ["slip", "slip"]]);
+    let settings = Settings { wall_pressure: WallPressure::Linear, ..common::parse(&box_between(sides)) };
+    let rule = |settings: &Settings, kind| conditions(settings)(kind, &Vector::from([0.0, 1.0]));
+    let kinds = [ParticleKind::Fluid, ParticleKind::Inlet, ParticleKind::Outlet, ParticleKind::Solid];
+    let pressure = [PressureRule::Solved, PressureRule::Solved, PressureRule::Zero, PressureRule::FromFluid];
+    assert_eq!(kinds.map(|kind| rule(&settings, kind).pressure), pressure);
+    let kept = VelocityRule::Kept;
+    assert_eq!(kinds.map(|kind| rule(&settings, kind).velocity), [VelocityRule::Solved, kept, kept, kept]);
+    let paper = Settings { wall_pressure: WallPressure::Paper, ..settings };
+    assert_eq!(rule(&paper, ParticleKind::Solid).pressure, PressureRule::Solved);
 }
 
 /// Images beyond periodic sides in x and slip walls in y.
@@ -163,9 +181,9 @@ fn images_lie_within_reach_of_the_sides() {
         (particles.position.clone(), particles.velocity.clone(), particles.pressure.clone());
     position[0] += Vector::from([0.01, 0.02]);
     (velocity[0], pressure[0]) = (Vector::from([5.0, 7.0]), 9.0);
-    images.positions(&mut position);
-    images.vectors(&mut velocity);
-    images.scalars(&mut pressure);
+    images.fill_positions(&mut position);
+    images.fill(&mut velocity);
+    images.fill(&mut pressure);
     let corner = particles.len() - 1;
     assert_relative_eq!(position[corner], Vector::from([1.11, 0.38]), epsilon = 1e-12);
     assert_eq!((velocity[corner], pressure[corner]), (Vector::from([5.0, -7.0]), 9.0));
@@ -177,10 +195,10 @@ fn what_is_stale_is_made_nan_and_what_looks_fresh_is_found() {
     let mut field = particles.pressure.clone();
     images.real(&mut field)[0] = 4.0;
     assert!(field[..2] == [4.0, 1.0] && field[2].is_nan());
-    images.check(&field, |_, value| value);
-    images.scalars(&mut field);
-    images.check(&field, |_, value| value);
-    images.check(&[], |_, value: f64| value);
+    images.check(&field);
+    images.fill(&mut field);
+    images.check(&field);
+    images.check::<f64>(&[]);
     images.blank(&mut field, 3);
     assert!(field.iter().all(|value| value.is_nan()));
     // Without poison what was there stays, and nothing is checked.
@@ -189,12 +207,12 @@ fn what_is_stale_is_made_nan_and_what_looks_fresh_is_found() {
     images.real(&mut field)[0] = 4.0;
     images.blank(&mut field, 3);
     assert_eq!(field, [4.0, 2.0, 3.0]);
-    images.check(&field, |_, value| value);
+    images.check(&field);
     images.poisons = true;
     // The panic is wanted.
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| ()));
-    let found = std::panic::catch_unwind(|| images.check(&field, |_, value| value));
+    let found = std::panic::catch_unwind(|| images.check(&field));
     std::panic::set_hook(hook);
     assert!(found.is_err());
 }

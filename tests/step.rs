@@ -76,14 +76,14 @@ fn largest(velocity: &[Vector<2>]) -> f64 {
 fn vectors(set: &Set<2>, value: impl Fn(usize) -> Vector<2>) -> Vec<Vector<2>> {
     let real = set.particles.real;
     let mut field: Vec<_> = (0..set.particles.len()).map(|i| if i < real { value(i) } else { Vector::zeros() }).collect();
-    set.frame.images.vectors(&mut field);
+    set.frame.images.fill(&mut field);
     field
 }
 
 fn scalars(set: &Set<2>, value: impl Fn(usize) -> f64) -> Vec<f64> {
     let real = set.particles.real;
     let mut field: Vec<_> = (0..set.particles.len()).map(|i| if i < real { value(i) } else { 0.0 }).collect();
-    set.frame.images.scalars(&mut field);
+    set.frame.images.fill(&mut field);
     field
 }
 
@@ -459,9 +459,9 @@ fn the_shift_sees_the_mirror_of_the_fluid_in_the_walls() {
             set.particles.position[i] += moved - moved.map(f64::round);
             (set.particles.velocity[i], set.particles.pressure[i]) = (plain.velocity[i], plain.pressure[i]);
         }
-        set.frame.images.positions(&mut set.particles.position);
-        set.frame.images.vectors(&mut set.particles.velocity);
-        set.frame.images.scalars(&mut set.particles.pressure);
+        set.frame.images.fill_positions(&mut set.particles.position);
+        set.frame.images.fill(&mut set.particles.velocity);
+        set.frame.images.fill(&mut set.particles.pressure);
         let carried = |shown: Vec<Vector<2>>| {
             let (mut walls, mut particles) = (Walls::new(&settings), set.particles.clone());
             walls.viscous_velocity = shown;

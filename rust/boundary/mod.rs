@@ -1,9 +1,11 @@
-//! Boundaries: open buffers and solid walls.
+//! Boundaries: what particles obey, open buffers and solid walls.
 
+mod condition;
 mod open;
 mod profile;
 mod solid;
 
-pub use open::{MassFlow, deep_in_inlet, end_step};
+pub use condition::{Condition, PressureRule, VelocityRule, conditions};
+pub use open::{MassFlow, end_step};
 pub use profile::surface_area;
 pub use solid::{Walls, extrapolate, extrapolate_pressure};

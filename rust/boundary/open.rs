@@ -64,15 +64,12 @@ fn sides(settings: &Settings) -> Vec<Side> {
         .collect()
 }
 
-/// Whether a particle lies so deep in an inlet buffer that all it sees is prescribed, and cut off at the buffer's end: its
+/// Whether a particle of an inlet buffer lies so deep in it that all it sees is prescribed, and cut off at the buffer's end: its
 /// divergence says nothing about the flow.
-pub fn deep_in_inlet<const D: usize>(settings: &Settings) -> impl Fn(ParticleKind, &Vector<D>) -> bool + Sync {
+pub fn deep_in_inlet<const D: usize>(settings: &Settings) -> impl Fn(&Vector<D>) -> bool + Sync {
     let inlets: Vec<Side> = sides(settings).into_iter().filter(|side| side.kind == Boundary::Inlet).collect();
     let radius = settings.support_radius();
-    move |kind, position| {
-        let depth = || outermost(&inlets, position).map_or(f64::NEG_INFINITY, |(inside, _)| -inside);
-        kind == ParticleKind::Inlet && depth() > radius
-    }
+    move |position| outermost(&inlets, position).is_some_and(|(inside, _)| -inside > radius)
 }
 
 /// The side that `position` is farthest beyond, or nearest to, and its distance inside it.

@@ -72,7 +72,7 @@ impl<const D: usize> Walls<D> {
     fn show(&mut self, particles: &Particles<D>, frame: &Frame<D>, seen: Vec<(usize, Vector<D>)>) {
         frame.images.blank(&mut self.viscous_velocity, particles.len());
         seen.into_iter().for_each(|(s, seen)| self.viscous_velocity[s] = seen);
-        frame.images.vectors(&mut self.viscous_velocity);
+        frame.images.fill(&mut self.viscous_velocity);
     }
 
     /// Set [`Walls::dispersion`] to `factor` ∇²u of the real particles. The compact Laplacian of a wave is too
@@ -91,7 +91,7 @@ impl<const D: usize> Walls<D> {
         parallel::for_each(&mut dispersion[..*real], |i, out| {
             *out = if kind[i] == ParticleKind::Fluid { laplacian(i) * factor } else { Vector::zeros() };
         });
-        frame.images.vectors(dispersion);
+        frame.images.fill(dispersion);
         let basis = |n: f64| [1.0, n];
         let solids = profiles(settings, particles, &frame.stencil, dispersion, |_| Vector::zeros(), basis);
         if !solids.is_empty() {
@@ -99,7 +99,7 @@ impl<const D: usize> Walls<D> {
             for (s, profile) in solids {
                 dispersion_of_real[s] = value_at(profile, basis(-particles.depth[s] / settings.particle_spacing));
             }
-            frame.images.vectors(dispersion);
+            frame.images.fill(dispersion);
         }
     }
 
@@ -157,7 +157,7 @@ pub fn extrapolate<const D: usize>(
     field: &mut [f64],
     at: impl Fn(&[f64], usize, Vector<D>) -> f64 + Sync,
 ) {
-    frame.images.scalars(field);
+    frame.images.fill(field);
     let values = &*field;
     let average = |i| shepard(settings, &frame.stencil, i, |j, r_ij| [at(values, j, r_ij)]).map_or(0.0, |[average]| average);
     let solids = (0..kind.len()).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
@@ -165,7 +165,7 @@ pub fn extrapolate<const D: usize>(
     if !extrapolated.is_empty() {
         let real = frame.images.real(field);
         extrapolated.into_iter().for_each(|(i, value)| real[i] = value);
-        frame.images.scalars(field);
+        frame.images.fill(field);
     }
 }
 

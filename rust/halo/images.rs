@@ -97,7 +97,16 @@ impl<const D: usize> Images<D> {
 
     /// Panic if an image of `field`, empty where it is not used, is stale and not poisoned: then a stage has written past
     /// [`Images::real`]. Nothing unless poison is on.
-    pub fn check<T: Poison + PartialEq>(&self, field: &[T], image: impl Fn(usize, T) -> T) {
+    pub fn check<T: Mirrored<D> + Poison + PartialEq>(&self, field: &[T]) {
+        self.check_with(field, |k, value| value.mirrored(&self.sign[k]));
+    }
+
+    /// [`Images::check`] of positions.
+    pub fn check_positions(&self, field: &[Vector<D>]) {
+        self.check_with(field, |k, x| self.position(k, x));
+    }
+
+    fn check_with<T: Poison + PartialEq>(&self, field: &[T], image: impl Fn(usize, T) -> T) {
         if self.poisons && !field.is_empty() {
             let (real, images) = field.split_at(field.len() - self.source.len());
             for (k, value) in images.iter().enumerate() {
@@ -116,24 +125,40 @@ impl<const D: usize> Images<D> {
         parallel::for_each(images, |k, value| *value = image(k, real[self.source[k] as usize]));
     }
 
-    pub fn positions(&self, field: &mut [Vector<D>]) {
+    /// Make the copies in `field` current: the one verb for it, whatever the field is.
+    pub fn fill<T: Mirrored<D>>(&self, field: &mut [T]) {
+        self.renew(field, |k, value| value.mirrored(&self.sign[k]));
+    }
+
+    /// [`Images::fill`] of positions, which a periodic side shifts too.
+    pub fn fill_positions(&self, field: &mut [Vector<D>]) {
         self.renew(field, |k, x| self.position(k, x));
     }
 
-    pub fn vectors(&self, field: &mut [Vector<D>]) {
-        self.renew(field, |k, u| self.vector(k, u));
-    }
-
-    /// Any field that an image shares with its source.
-    pub fn scalars<T: Copy + Send + Sync>(&self, field: &mut [T]) {
-        self.renew(field, |_, value| value);
-    }
-
-    pub fn position(&self, k: usize, x: Vector<D>) -> Vector<D> {
+    fn position(&self, k: usize, x: Vector<D>) -> Vector<D> {
         self.sign[k].component_mul(&x) + self.offset[k]
     }
+}
 
-    pub fn vector(&self, k: usize, u: Vector<D>) -> Vector<D> {
-        self.sign[k].component_mul(&u)
+/// What a particle carries, and its image across slip walls, whose normals `sign` has −1 at.
+pub trait Mirrored<const D: usize>: Copy + Send + Sync {
+    fn mirrored(self, sign: &Vector<D>) -> Self;
+}
+
+impl<const D: usize> Mirrored<D> for f64 {
+    fn mirrored(self, _: &Vector<D>) -> Self {
+        self
+    }
+}
+
+impl<const D: usize, const N: usize> Mirrored<D> for [f64; N] {
+    fn mirrored(self, _: &Vector<D>) -> Self {
+        self
+    }
+}
+
+impl<const D: usize> Mirrored<D> for Vector<D> {
+    fn mirrored(self, sign: &Vector<D>) -> Self {
+        sign.component_mul(&self)
     }
 }

@@ -3,5 +3,5 @@
 mod images;
 mod poison;
 
-pub use images::Images;
+pub use images::{Images, Mirrored};
 pub use poison::Poison;

@@ -2,7 +2,7 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
-use crate::boundary::{deep_in_inlet, extrapolate_pressure};
+use crate::boundary::{PressureRule, VelocityRule, conditions, extrapolate_pressure};
 use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, vector_laplacian};
 use crate::flow::{Flow, Step};
 use crate::halo::Poison;
@@ -177,7 +177,7 @@ impl<const D: usize> Alsph<D> {
                 derived.laplacian = vector_laplacian(&frame.stencil, velocity, i, |s| seen(s, i));
             });
         }
-        frame.images.scalars(&mut self.divergence_pressure);
+        frame.images.fill(&mut self.divergence_pressure);
     }
 
     /// What u^n gives of the viscous term.
@@ -198,7 +198,7 @@ impl<const D: usize> Alsph<D> {
     fn predict_velocity(&mut self, step: Step, Flow { particles, frame, before, .. }: &Flow<D>) {
         let gravity = Vector::<D>::from_column_slice(&step.settings.body_force);
         let (dt, viscosity) = (step.time_step, step.settings.kinematic_viscosity);
-        let paper_walls = step.settings.wall_pressure == WallPressure::Paper;
+        let condition = conditions(step.settings);
         let (initial, derived, r_al) = (&before.velocity, &self.derived, self.coefficients.penalty);
         let theta = step.settings.viscous_theta;
         let explicit = |i: usize| self.explicit.get(i).copied().unwrap_or_else(Vector::zeros);
@@ -207,20 +207,17 @@ impl<const D: usize> Alsph<D> {
             frame.images.real(&mut self.velocity_star),
             &mut self.pressure_laplacian,
             |i, (penalty, p), star, pressure_laplacian| {
-                let still = match particles.kind[i] {
-                    ParticleKind::Outlet => true,
-                    ParticleKind::Solid => !paper_walls,
-                    _ => false,
-                };
                 *pressure_laplacian = p;
-                *star = if still {
-                    initial[i]
-                } else {
-                    initial[i] + (penalty * r_al + (derived[i].laplacian * theta + explicit(i)) * viscosity + gravity) * dt
+                *star = match condition(particles.kind[i], &particles.position[i]).pressure {
+                    PressureRule::Zero | PressureRule::FromFluid => initial[i],
+                    PressureRule::Solved | PressureRule::SolvedWithoutDivergence => {
+                        initial[i]
+                            + (penalty * r_al + (derived[i].laplacian * theta + explicit(i)) * viscosity + gravity) * dt
+                    }
                 };
             },
         );
-        frame.images.vectors(&mut self.velocity_star);
+        frame.images.fill(&mut self.velocity_star);
     }
 
     /// p^{m+1} (10), with the pressure of solid particles (20).
@@ -229,7 +226,7 @@ impl<const D: usize> Alsph<D> {
             let gradient = &mut self.pressure_gradient;
             frame.images.blank(gradient, particles.len());
             frame.stencil.evaluate_near_solids(Gradient(&particles.pressure), frame.images.real(gradient));
-            frame.images.vectors(gradient);
+            frame.images.fill(gradient);
         }
         let Particles { kind, normal, position, pressure, .. } = particles;
         let (kind, normal) = (&*kind, &*normal);
@@ -238,22 +235,22 @@ impl<const D: usize> Alsph<D> {
         let paper_walls = settings.wall_pressure == WallPressure::Paper;
         let (star, initial, laplacian) = (&self.velocity_star, &before.velocity, &self.pressure_laplacian);
         let derived = &self.derived;
-        let (position, deep_in_inlet) = (&*position, deep_in_inlet(settings));
+        let (position, condition) = (&*position, conditions(settings));
         frame.stencil.for_each_one(Divergence(star), frame.images.real(pressure), |i, divergence, p| {
-            let solid = kind[i] == ParticleKind::Solid;
-            let divergence = if deep_in_inlet(kind[i], &position[i]) { 0.0 } else { divergence - derived[i].solenoidal };
-            if kind[i] == ParticleKind::Outlet {
-                *p = 0.0;
-            } else if !solid || paper_walls {
-                *p -= penalty * (settings.density * divergence - dt * laplacian[i]);
+            let source = |divergence: f64| penalty * (settings.density * divergence - dt * laplacian[i]);
+            match condition(kind[i], &position[i]).pressure {
+                PressureRule::Zero => *p = 0.0,
+                PressureRule::Solved => *p -= source(divergence - derived[i].solenoidal),
+                PressureRule::SolvedWithoutDivergence => *p -= source(0.0),
+                PressureRule::FromFluid => {}
             }
-            if solid && paper_walls {
+            if paper_walls && kind[i] == ParticleKind::Solid {
                 // ∂p/∂n r_s with the pseudo-acceleration Δu/Δt and, from (12), the pseudo-displacement ½ Δu Δt.
                 *p += 0.5 * settings.density * (star[i] - initial[i]).dot(&normal[i]).powi(2);
             }
         });
         if paper_walls {
-            frame.images.scalars(pressure);
+            frame.images.fill(pressure);
         } else {
             extrapolate_pressure(settings, frame, particles, &self.pressure_gradient);
         }
@@ -261,29 +258,28 @@ impl<const D: usize> Alsph<D> {
 
     /// u^{m+1} (11). Buffers and solids keep their velocities.
     fn correct_velocity(&mut self, step: Step, Flow { particles, frame, .. }: &mut Flow<D>) {
-        let Particles { kind, pressure, velocity, .. } = particles;
-        let (kind, pressure, star) = (&*kind, &*pressure, &self.velocity_star);
+        let Particles { kind, position, pressure, velocity, .. } = particles;
+        let (kind, position, pressure, star) = (&*kind, &*position, &*pressure, &self.velocity_star);
+        let condition = conditions(step.settings);
         let factor = step.time_step / step.settings.density;
         frame.stencil.for_each_one(Gradient(pressure), frame.images.real(velocity), |i, gradient, u| {
-            if kind[i] == ParticleKind::Fluid {
+            if condition(kind[i], &position[i]).velocity == VelocityRule::Solved {
                 *u = star[i] - gradient * factor;
             }
         });
-        frame.images.vectors(&mut particles.velocity);
+        frame.images.fill(&mut particles.velocity);
     }
 
     /// Panic if a stage has left stale images that look fresh. Nothing unless poison is on.
     fn check_images(&self, Flow { particles, frame, walls, .. }: &Flow<D>) {
         let images = &frame.images;
-        images.check(&particles.position, |k, x| images.position(k, x));
+        images.check_positions(&particles.position);
         for field in
             [&particles.velocity, &self.velocity_star, &self.pressure_gradient, &walls.viscous_velocity, &walls.dispersion]
         {
-            images.check(field, |k, u| images.vector(k, u));
+            images.check(field);
         }
-        for field in [&particles.pressure, &frame.stencil.volume] {
-            images.check(field, |_, value| value);
-        }
-        images.check(&self.divergence_pressure, |_, value| value);
+        [&particles.pressure, &frame.stencil.volume].into_iter().for_each(|field| images.check(field));
+        images.check(&self.divergence_pressure);
     }
 }

@@ -19,10 +19,10 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
-use crate::boundary::{deep_in_inlet, extrapolate};
+use crate::boundary::{PressureRule, VelocityRule, conditions, extrapolate};
 use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian};
 use crate::flow::{Flow, Step};
-use crate::particles::{ParticleKind, Particles};
+use crate::particles::Particles;
 use crate::scheme::Derived;
 use crate::scheme::alsph::Coefficients;
 use crate::settings::{Eigenvalues, Settings, SweepPressure, SweepWeights};
@@ -95,21 +95,24 @@ impl Projection {
         let Coefficients { relaxation, shortest, .. } = coefficients;
         let Particles { real, kind, position, pressure, velocity, .. } = particles;
         let (kind, position) = (&kind[..*real], &*position);
-        let deep_in_inlet = deep_in_inlet(settings);
+        let condition = conditions(settings);
         let divergence = &mut self.divergence;
         frame.images.blank(divergence, velocity.len());
         for sweep in 0..settings.projection_sweeps {
             let relaxation = relaxation / weight(settings, sweep);
             let factor = PRESSURE_SHARE * settings.density * relaxation / time_step;
             frame.stencil.for_each_one(Divergence(velocity), frame.images.real(divergence), |i, value, out| {
-                let none = kind[i] == ParticleKind::Outlet || deep_in_inlet(kind[i], &position[i]);
-                *out = if none { 0.0 } else { value - derived[i].solenoidal };
+                *out = match condition(kind[i], &position[i]).pressure {
+                    PressureRule::Zero | PressureRule::SolvedWithoutDivergence => 0.0,
+                    PressureRule::Solved | PressureRule::FromFluid => value - derived[i].solenoidal,
+                };
             });
             extrapolate(settings, frame, kind, divergence, |divergence, j, _| divergence[j]);
             let (corrected, pressure) = (frame.images.real(velocity), frame.images.real(pressure));
+            let is_solved = |i: usize| condition(kind[i], &position[i]).velocity == VelocityRule::Solved;
             let correct = |i: usize, gradient: Vector<D>, u: &mut Vector<D>, p: &mut f64| {
                 *p -= factor * divergence[i];
-                if kind[i] == ParticleKind::Fluid {
+                if is_solved(i) {
                     *u += gradient * relaxation;
                 }
             };
@@ -120,14 +123,14 @@ impl Projection {
                 parallel::for_each(frame.images.real(rough), |i, rough| {
                     *rough = [divergence[i], pressure[i] - factor * divergence[i] - before[i]];
                 });
-                frame.images.scalars(rough);
+                frame.images.fill(rough);
                 frame.stencil.for_each(
                     GradientAndLaplacian(rough),
                     corrected,
                     pressure,
                     |i, (gradient, laplacian), u, p| {
                         correct(i, gradient, u, p);
-                        if kind[i] == ParticleKind::Fluid {
+                        if is_solved(i) {
                             *p += laplacian * shortest;
                         }
                     },
@@ -135,9 +138,9 @@ impl Projection {
             } else {
                 frame.stencil.for_each(Gradient(divergence), corrected, pressure, correct);
             }
-            frame.images.vectors(velocity);
-            frame.images.check(divergence, |_, value| value);
+            frame.images.fill(velocity);
+            frame.images.check(divergence);
         }
-        frame.images.scalars(pressure);
+        frame.images.fill(pressure);
     }
 }

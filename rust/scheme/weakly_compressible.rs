@@ -12,7 +12,7 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
-use crate::boundary::{deep_in_inlet, extrapolate_pressure};
+use crate::boundary::{PressureRule, VelocityRule, conditions, extrapolate_pressure};
 use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient};
 use crate::flow::{Flow, Step};
 use crate::particles::{ParticleKind, Particles};
@@ -85,24 +85,22 @@ impl<const D: usize> WeaklyCompressible<D> {
     fn advance_pressure(&self, step: Step, Flow { particles, frame, .. }: &mut Flow<D>) {
         let Particles { kind, position, pressure, .. } = particles;
         let stiffness = 0.5 * step.time_step * step.settings.density * self.sound_speed.powi(2);
-        let deep_in_inlet = deep_in_inlet(step.settings);
-        parallel::for_each(frame.images.real(pressure), |i, p| {
-            if kind[i] == ParticleKind::Outlet {
-                *p = 0.0;
-            } else if kind[i] != ParticleKind::Solid && !deep_in_inlet(kind[i], &position[i]) {
-                *p -= stiffness * self.divergence[i];
-            }
+        let condition = conditions(step.settings);
+        parallel::for_each(frame.images.real(pressure), |i, p| match condition(kind[i], &position[i]).pressure {
+            PressureRule::Zero => *p = 0.0,
+            PressureRule::Solved => *p -= stiffness * self.divergence[i],
+            PressureRule::SolvedWithoutDivergence | PressureRule::FromFluid => {}
         });
     }
 
     /// The pressure that solids show.
     fn extrapolate_wall_pressure(&mut self, settings: &Settings, Flow { particles, frame, .. }: &mut Flow<D>) {
-        frame.images.scalars(&mut particles.pressure);
+        frame.images.fill(&mut particles.pressure);
         if settings.wall_pressure == WallPressure::Linear {
             let gradient = &mut self.near_walls;
             frame.images.blank(gradient, particles.len());
             frame.stencil.evaluate_near_solids(Gradient(&particles.pressure), frame.images.real(gradient));
-            frame.images.vectors(gradient);
+            frame.images.fill(gradient);
         }
         extrapolate_pressure(settings, frame, particles, &self.near_walls);
     }
@@ -122,14 +120,14 @@ impl<const D: usize> WeaklyCompressible<D> {
         );
         let gravity = Vector::<D>::from_column_slice(&settings.body_force);
         let sharper = |i: usize| self.sharper.get(i).copied().unwrap_or_else(Vector::zeros);
-        let kind = &particles.kind;
+        let (kind, position, condition) = (&particles.kind, &particles.position, conditions(settings));
         parallel::for_each(frame.images.real(&mut particles.velocity), |i, u| {
-            if kind[i] == ParticleKind::Fluid {
+            if condition(kind[i], &position[i]).velocity == VelocityRule::Solved {
                 let viscous = (self.laplacian[i] + sharper(i)) * settings.kinematic_viscosity;
                 *u += (viscous - self.gradient[i] / settings.density + gravity) * step.time_step;
             }
         });
-        frame.images.vectors(&mut particles.velocity);
+        frame.images.fill(&mut particles.velocity);
     }
 
     /// The diffusion of the pressure in the middle of the step. What walls and buffers show takes no part in it.
@@ -138,7 +136,7 @@ impl<const D: usize> WeaklyCompressible<D> {
             return;
         }
         if self.density_diffusion == DensityDiffusion::Antuono {
-            frame.images.vectors(&mut self.gradient);
+            frame.images.fill(&mut self.gradient);
             let gradient = &self.gradient;
             frame.stencil.for_each_one(Divergence(gradient), &mut self.diffusing, |_, value, out| *out -= value);
         }
