@@ -19,6 +19,10 @@ pub enum ParticleKind {
     Solid = 3,
 }
 
+impl ParticleKind {
+    pub const NAMES: [&str; 4] = ["fluid", "inlet", "outlet", "solid"];
+}
+
 impl TryFrom<u8> for ParticleKind {
     type Error = Error;
 
@@ -52,18 +56,23 @@ pub struct Particles<const D: usize> {
     pub id: Vec<u64>,
 }
 
-/// Apply `$f` to every array of the particles.
+/// Evaluate `$f` for every array of `$particles`, which it knows as `$array` and by the name `$name`: the one list of them.
 macro_rules! each_array {
-    ($self:ident, $array:ident => $f:expr) => {
-        each_array!(@ $self, $array => $f; position velocity pressure kind body normal depth id)
+    ($particles:ident, $array:ident => $f:expr) => {
+        each_array!($particles, (&mut) $array, _name => $f)
     };
-    (@ $self:ident, $array:ident => $f:expr; $($field:ident)*) => {
-        $({
-            let $array = &mut $self.$field;
-            $f;
-        })*
+    ($particles:ident, ($($reference:tt)+) $array:ident, $name:ident => $f:expr) => {
+        each_array!(@ $particles, ($($reference)+) $array, $name => $f; position velocity pressure kind body normal depth id)
     };
+    (@ $particles:ident, $reference:tt $array:ident, $name:ident => $f:expr; $($field:ident)*) => {
+        $(each_array!(@one $particles, $reference $array, $name => $f; $field);)*
+    };
+    (@one $particles:ident, ($($reference:tt)+) $array:ident, $name:ident => $f:expr; $field:ident) => {{
+        let ($array, $name) = ($($reference)+ $particles.$field, stringify!($field));
+        $f;
+    }};
 }
+pub(crate) use each_array;
 
 impl<const D: usize> Particles<D> {
     /// Number of real particles and images.

@@ -2,9 +2,10 @@
 
 use crate::base::lanes::{Instructions, LANES};
 use crate::base::{Error, Matrix, Vector};
+use crate::loads::Load;
 use crate::neighbours::Entry;
-use crate::particles::{ParticleKind, Particles};
-use crate::report::{Clock, Report};
+use crate::particles::{ParticleKind, Particles, each_array};
+use crate::report::{Clock, Column, Report, columns};
 use crate::settings::Settings;
 use crate::simulation::Simulation;
 use numpy::ndarray::Array2;
@@ -100,7 +101,7 @@ impl PySimulation {
     fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let counts = engine!(&self.0, s => s.particles().counts());
         let dict = PyDict::new(py);
-        for (name, count) in KIND_NAMES.iter().zip(counts) {
+        for (name, count) in ParticleKind::NAMES.iter().zip(counts) {
             dict.set_item(name, count)?;
         }
         Ok(dict)
@@ -231,8 +232,6 @@ fn _alsph(module: &Bound<'_, PyModule>) -> PyResult<()> {
 /// Each thread takes memory of the system, which a wrong number must not exhaust.
 const MOST_THREADS: usize = 4096;
 
-const KIND_NAMES: [&str; 4] = ["fluid", "inlet", "outlet", "solid"];
-
 fn wall(seconds: Option<f64>) -> PyResult<Option<Duration>> {
     let convert =
         |s| Duration::try_from_secs_f64(s).map_err(|e| ConfigError::new_err(format!("argument `wall_seconds`: {e}")));
@@ -292,21 +291,17 @@ fn read_rows<const D: usize>(
 }
 
 fn read_particles<const D: usize>(state: &Bound<'_, PyDict>) -> PyResult<Particles<D>> {
-    let position = read_rows(state, "position", None)?;
-    let count = position.len();
-    let kind = read_array::<u8>(state, "kind", count)?.into_iter().map(ParticleKind::try_from).collect::<Result<_, _>>()?;
-    let id = if state.contains("id")? { read_array(state, "id", count)? } else { (0..count as u64).collect() };
-    Ok(Particles {
-        real: count,
-        velocity: read_rows(state, "velocity", Some(count))?,
-        pressure: read_array(state, "pressure", count)?,
-        kind,
-        body: read_array(state, "body", count)?,
-        normal: read_rows(state, "normal", Some(count))?,
-        depth: read_array(state, "depth", count)?,
-        id,
-        position,
-    })
+    let count = read_rows::<D>(state, "position", None)?.len();
+    let mut particles = Particles { real: count, ..Particles::default() };
+    each_array!(particles, (&mut) array, name => {
+        if name != "id" || state.contains(name)? {
+            *array = Exchanged::read(state, name, count)?;
+        }
+    });
+    if particles.id.is_empty() {
+        particles.id = (0..count as u64).collect();
+    }
+    Ok(particles)
 }
 
 fn read_threads(threads: &Bound<'_, PyAny>) -> PyResult<usize> {
@@ -336,16 +331,8 @@ fn read_clock(state: &Bound<'_, PyDict>) -> PyResult<Clock> {
 }
 
 fn state<'py, const D: usize>(py: Python<'py>, particles: &Particles<D>, clock: Clock) -> PyResult<Bound<'py, PyDict>> {
-    let real = particles.real;
     let dict = PyDict::new(py);
-    dict.set_item("position", vectors(py, particles.position[..real].iter().copied()))?;
-    dict.set_item("velocity", vectors(py, particles.velocity[..real].iter().copied()))?;
-    dict.set_item("pressure", PyArray1::from_slice(py, &particles.pressure[..real]))?;
-    dict.set_item("kind", PyArray1::from_iter(py, particles.kind[..real].iter().map(|&kind| kind as u8)))?;
-    dict.set_item("body", PyArray1::from_slice(py, &particles.body[..real]))?;
-    dict.set_item("normal", vectors(py, particles.normal[..real].iter().copied()))?;
-    dict.set_item("depth", PyArray1::from_slice(py, &particles.depth[..real]))?;
-    dict.set_item("id", PyArray1::from_slice(py, &particles.id[..real]))?;
+    each_array!(particles, (&) array, name => dict.set_item(name, Exchanged::write(py, &array[..particles.real]))?);
     dict.set_item("time", clock.time)?;
     dict.set_item("step", clock.step)?;
     dict.set_item("mass_in", clock.mass_in)?;
@@ -380,44 +367,64 @@ fn space_snapshot<'py>(py: Python<'py>, simulation: &mut Simulation<3>) -> PyRes
     Ok(dict)
 }
 
-/// A name and the number that it stands for in a report.
-type Column<const D: usize> = (&'static str, fn(&Report<D>) -> f64);
-
 fn history<'py, const D: usize>(py: Python<'py>, reports: &[Report<D>], bodies: usize) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    let numbers: [Column<D>; 12] = [
-        ("time", |r| r.clock.time),
-        ("time_step", |r| r.time_step),
-        ("divergence_max", |r| r.outcome.divergence_max),
-        ("divergence_mean", |r| r.outcome.divergence_sum / r.fluid.max(1) as f64),
-        ("divergence_sum", |r| r.outcome.divergence_sum),
-        ("velocity_max", |r| r.velocity_max),
-        ("penalty_coefficient", |r| r.penalty),
-        ("volume", |r| r.volume),
-        ("kinetic_energy", |r| r.kinetic_energy),
-        ("mass_in", |r| r.clock.mass_in),
-        ("mass_out", |r| r.clock.mass_out),
-        ("inlet_pressure", |r| r.inlet_pressure),
-    ];
-    for (name, number) in numbers {
-        dict.set_item(name, PyArray1::from_iter(py, reports.iter().map(number)))?;
-    }
-    let integers = |f: &dyn Fn(&Report<D>) -> u64| PyArray1::from_iter(py, reports.iter().map(f));
-    dict.set_item("step", integers(&|r| r.clock.step))?;
-    dict.set_item("iterations", integers(&|r| r.outcome.iterations as u64))?;
-    dict.set_item("converged", PyArray1::from_iter(py, reports.iter().map(|r| r.outcome.converged)))?;
-    for (k, name) in KIND_NAMES.iter().enumerate() {
-        dict.set_item(name, integers(&|r| r.counts[k] as u64))?;
-    }
-    let loads = |name: &str, width: usize, f: &dyn Fn(&crate::loads::Load<D>, usize) -> f64| {
-        let values =
-            reports.iter().flat_map(|r| r.loads.iter().flat_map(|load| (0..width).map(|k| f(load, k)))).collect::<Vec<_>>();
+    let of_bodies = |name: &str, width: usize, of: &dyn Fn(&Load<D>) -> Vec<f64>| {
+        let values = reports.iter().flat_map(|r| r.loads.iter().flat_map(of)).collect::<Vec<_>>();
         dict.set_item(name, PyArray1::from_vec(py, values).reshape([reports.len(), bodies, width])?)
     };
     let spin = if D == 2 { 1 } else { 3 };
-    loads("pressure_force", D, &|load, k| load.pressure_force[k])?;
-    loads("viscous_force", D, &|load, k| load.viscous_force[k])?;
-    loads("pressure_torque", spin, &|load, k| load.pressure_torque[3 - spin + k])?;
-    loads("viscous_torque", spin, &|load, k| load.viscous_torque[3 - spin + k])?;
+    for (name, column) in columns() {
+        match column {
+            Column::Number(of) => dict.set_item(name, PyArray1::from_iter(py, reports.iter().map(of)))?,
+            Column::Count(of) => dict.set_item(name, PyArray1::from_iter(py, reports.iter().map(of)))?,
+            Column::Flag(of) => dict.set_item(name, PyArray1::from_iter(py, reports.iter().map(of)))?,
+            Column::Force(of) => of_bodies(name, D, &|load| of(load).iter().copied().collect())?,
+            Column::Torque(of) => of_bodies(name, spin, &|load| of(load)[3 - spin..].to_vec())?,
+        }
+    }
     Ok(dict)
+}
+
+/// What an array of particles is in Python.
+trait Exchanged: Sized {
+    fn write<'py>(py: Python<'py>, values: &[Self]) -> Bound<'py, PyAny>;
+
+    /// Those of the state, `count` of them.
+    fn read(state: &Bound<'_, PyDict>, name: &'static str, count: usize) -> PyResult<Vec<Self>>;
+}
+
+macro_rules! exchange_as_it_is {
+    ($($number:ty)*) => {
+        $(impl Exchanged for $number {
+            fn write<'py>(py: Python<'py>, values: &[Self]) -> Bound<'py, PyAny> {
+                PyArray1::from_slice(py, values).into_any()
+            }
+
+            fn read(state: &Bound<'_, PyDict>, name: &'static str, count: usize) -> PyResult<Vec<Self>> {
+                read_array(state, name, count)
+            }
+        })*
+    };
+}
+exchange_as_it_is!(f64 u16 u64);
+
+impl Exchanged for ParticleKind {
+    fn write<'py>(py: Python<'py>, values: &[Self]) -> Bound<'py, PyAny> {
+        PyArray1::from_iter(py, values.iter().map(|&kind| kind as u8)).into_any()
+    }
+
+    fn read(state: &Bound<'_, PyDict>, name: &'static str, count: usize) -> PyResult<Vec<Self>> {
+        Ok(read_array::<u8>(state, name, count)?.into_iter().map(Self::try_from).collect::<Result<_, _>>()?)
+    }
+}
+
+impl<const D: usize> Exchanged for Vector<D> {
+    fn write<'py>(py: Python<'py>, values: &[Self]) -> Bound<'py, PyAny> {
+        vectors(py, values.iter().copied()).into_any()
+    }
+
+    fn read(state: &Bound<'_, PyDict>, name: &'static str, count: usize) -> PyResult<Vec<Self>> {
+        read_rows(state, name, Some(count))
+    }
 }

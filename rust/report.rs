@@ -1,5 +1,6 @@
 //! Clock and report: what goes on through a restart, and what is recorded of a step.
 
+use crate::base::Vector;
 use crate::base::parallel;
 use crate::flow::Step;
 use crate::loads::Load;
@@ -39,6 +40,47 @@ pub struct Report<const D: usize> {
     /// Fluid, inlet, outlet, solid at the end of the step.
     pub counts: [usize; 4],
     pub loads: Vec<Load<D>>,
+}
+
+/// What a column of the history holds of a step.
+pub enum Column<const D: usize> {
+    Number(fn(&Report<D>) -> f64),
+    Count(fn(&Report<D>) -> u64),
+    Flag(fn(&Report<D>) -> bool),
+    /// A vector for each body.
+    Force(fn(&Load<D>) -> Vector<D>),
+    /// Three components for each body, of which the last alone says something in 2-D.
+    Torque(fn(&Load<D>) -> [f64; 3]),
+}
+
+/// The columns of the history: the one list of them.
+pub fn columns<const D: usize>() -> Vec<(&'static str, Column<D>)> {
+    use Column::{Count, Flag, Force, Number, Torque};
+    vec![
+        ("time", Number(|r| r.clock.time)),
+        ("time_step", Number(|r| r.time_step)),
+        ("divergence_max", Number(|r| r.outcome.divergence_max)),
+        ("divergence_mean", Number(|r| r.outcome.divergence_sum / r.fluid.max(1) as f64)),
+        ("divergence_sum", Number(|r| r.outcome.divergence_sum)),
+        ("velocity_max", Number(|r| r.velocity_max)),
+        ("penalty_coefficient", Number(|r| r.penalty)),
+        ("volume", Number(|r| r.volume)),
+        ("kinetic_energy", Number(|r| r.kinetic_energy)),
+        ("mass_in", Number(|r| r.clock.mass_in)),
+        ("mass_out", Number(|r| r.clock.mass_out)),
+        ("inlet_pressure", Number(|r| r.inlet_pressure)),
+        ("step", Count(|r| r.clock.step)),
+        ("iterations", Count(|r| r.outcome.iterations as u64)),
+        ("converged", Flag(|r| r.outcome.converged)),
+        (ParticleKind::NAMES[0], Count(|r| r.counts[0] as u64)),
+        (ParticleKind::NAMES[1], Count(|r| r.counts[1] as u64)),
+        (ParticleKind::NAMES[2], Count(|r| r.counts[2] as u64)),
+        (ParticleKind::NAMES[3], Count(|r| r.counts[3] as u64)),
+        ("pressure_force", Force(|load| load.pressure_force)),
+        ("viscous_force", Force(|load| load.viscous_force)),
+        ("pressure_torque", Torque(|load| load.pressure_torque)),
+        ("viscous_torque", Torque(|load| load.viscous_torque)),
+    ]
 }
 
 impl<const D: usize> Report<D> {

@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 
 from alsph.engine.inflow import Prescription
+from alsph.engine.simulation import TYPES
 from alsph.errors import DamagedError, RunFolderError
 from alsph.folder.durable import replacing
 from alsph.folder.reading import DAMAGE, rows, sound
@@ -27,7 +28,6 @@ NAME = b"alsph checkpoint"
 HDF5 = b"\x89HDF\r\n\x1a\n"
 CASE = "case"
 INFLOW = {"time": "inflow_time", "position": "inflow_position", "velocity": "inflow_velocity"}
-ARRAYS = ("position", "velocity", "pressure", "kind", "body", "normal", "depth", "id")
 READ_BYTES = 2**20
 
 
@@ -98,7 +98,7 @@ def read(path: Path) -> Checkpoint:
         _check_head(path)
         with h5py.File(path, "r", locking=False) as file:
             state = {name: _number(file, name) for name in file.attrs}
-            state |= {name: rows(sound(file, name)) for name in ARRAYS if name in file}
+            state |= {name: rows(sound(file, name)) for name in TYPES if name in file}
             case = json.loads(rows(sound(file, CASE)).tobytes()) if CASE in file else None
             inflow = _inflow(file)
         if not isinstance(case, dict | None):
