@@ -244,7 +244,7 @@ fn main() {
             0,
             Box::new(|| {
                 let radius = settings.neighbour_distance();
-                grid.build(&particles.position, radius, settings.bounds());
+                grid.build(&particles.position, &particles.id, radius, settings.bounds());
                 list.search(&particles, None, &grid, radius);
             }),
         ),

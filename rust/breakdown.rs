@@ -1,11 +1,12 @@
 //! Breakdown of a computation: what is looked for after every step, and what is likely to have caused it.
 
 use crate::base::Vector;
-use crate::base::parallel;
+use crate::base::parallel::CHUNK;
 use crate::frame::Frame;
 use crate::kernel::{Smoothing, with_kernel};
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::{Boundary, Settings, TimeStepLimits};
+use rayon::prelude::*;
 
 /// A particle whose neighbours' kernels sum to less than this part of its own is alone.
 const LONELY: f64 = 0.25;
@@ -63,7 +64,12 @@ pub fn find<const D: usize>(
         }
         None
     };
-    parallel::reduce(particles.real, |mut range| range.find_map(bad), Option::or).flatten()
+    // Of several the one with the least id, whose choice does not depend on how they are stored.
+    (0..particles.real)
+        .into_par_iter()
+        .with_min_len(CHUNK)
+        .filter_map(bad)
+        .min_by_key(|symptom| particles.id[symptom.particle])
 }
 
 /// V of a particle that is alone but for a few neighbours at the edge of its support.

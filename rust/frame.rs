@@ -59,7 +59,12 @@ impl<const D: usize> Frame<D> {
         self.reach = search_radius(settings) + self.skin + if lasts { 2.0 * distance } else { 0.0 };
         particles.drop_images();
         if reorder {
-            self.grid.build(&particles.position, CLUSTER_REACH * settings.particle_spacing, settings.bounds());
+            self.grid.build(
+                &particles.position,
+                &particles.id,
+                CLUSTER_REACH * settings.particle_spacing,
+                settings.bounds(),
+            );
             particles.reorder(self.grid.order());
         }
         // Images that come within reach during the step, too.
@@ -105,7 +110,7 @@ impl<const D: usize> Frame<D> {
     }
 
     fn list_neighbours(&mut self, settings: &Settings, particles: &Particles<D>) {
-        self.grid.build(&particles.position, self.reach, settings.bounds());
+        self.grid.build(&particles.position, &particles.id, self.reach, settings.bounds());
         let expected = (!self.expected.is_empty()).then_some(&self.expected[..]);
         self.stencil.neighbours.search(particles, expected, &self.grid, search_radius(settings) + self.skin);
     }

@@ -6,12 +6,13 @@
 //! The viscous pairs feel the slope of the velocity over the width of a kernel. Where
 //! the velocity's slope at the surface is known, the viscous part is its shear over the area of the surface, and the pressure part the rest.
 
-use crate::base::Vector;
-use crate::base::parallel;
+use crate::base::parallel::CHUNK;
+use crate::base::{ExactSum, Vector};
 use crate::boundary::{Walls, surface_area};
 use crate::frame::Frame;
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
+use rayon::prelude::*;
 
 /// Force and torque on one body. In 2-D the torque's only component is the last one.
 #[derive(Clone, Copy, Debug)]
@@ -33,20 +34,30 @@ impl<const D: usize> Default for Load<D> {
     }
 }
 
+/// What the loads on a body are summed in: both forces, then both torques, of three components each.
+type Sums = [ExactSum; 12];
+
 impl<const D: usize> Load<D> {
-    /// Add a pressure force that acts at `arm`, and a viscous force that acts at `surface`.
-    fn add(&mut self, arm: &Vector<D>, pressure: Vector<D>, surface: &Vector<D>, viscous: Vector<D>) {
-        self.pressure_force += pressure;
-        self.viscous_force += viscous;
-        add(&mut self.pressure_torque, cross(arm, &pressure));
-        add(&mut self.viscous_torque, cross(surface, &viscous));
+    /// That of a pressure force that acts at `arm`, and a viscous force that acts at `surface`.
+    fn new(arm: &Vector<D>, pressure: Vector<D>, surface: &Vector<D>, viscous: Vector<D>) -> Self {
+        Self {
+            pressure_force: pressure,
+            viscous_force: viscous,
+            pressure_torque: cross(arm, &pressure),
+            viscous_torque: cross(surface, &viscous),
+        }
     }
 
-    fn merge(&mut self, other: &Self) {
-        self.pressure_force += other.pressure_force;
-        self.viscous_force += other.viscous_force;
-        add(&mut self.pressure_torque, other.pressure_torque);
-        add(&mut self.viscous_torque, other.viscous_torque);
+    fn add_to(&self, sums: &mut Sums) {
+        let forces = [&self.pressure_force, &self.viscous_force].map(components);
+        let terms = forces.into_iter().chain([self.pressure_torque, self.viscous_torque]).flatten();
+        sums.iter_mut().zip(terms).for_each(|(sum, term)| sum.add(term));
+    }
+
+    fn of(sums: &Sums) -> Self {
+        let three = |start: usize| std::array::from_fn(|k| sums[start + k].value());
+        let force = |start: usize| Vector::from_fn(|k, _| sums[start + k].value());
+        Self { pressure_force: force(0), viscous_force: force(3), pressure_torque: three(6), viscous_torque: three(9) }
     }
 }
 
@@ -59,26 +70,21 @@ pub fn loads<const D: usize>(
     pressure: impl Fn(usize) -> f64 + Sync,
 ) -> Vec<Load<D>> {
     let centers: Vec<_> = settings.bodies.iter().map(|body| Vector::<D>::from_column_slice(&body.center)).collect();
-    let chunk = |range: std::ops::Range<usize>| {
-        let mut loads = Vec::new();
-        for s in range.filter(|&i| particles.kind[i] == ParticleKind::Solid) {
-            loads.resize(centers.len(), Load::default());
-            let (pressure, viscous) = force_on(settings, particles, frame, walls, &pressure, s);
-            let body = particles.body[s] as usize;
-            let arm = particles.position[s] - centers[body];
-            loads[body].add(&arm, pressure, &(arm + particles.normal[s] * particles.depth[s]), viscous);
-        }
-        loads
+    let none = || vec![Sums::default(); centers.len()];
+    let solids =
+        (0..particles.real).into_par_iter().with_min_len(CHUNK).filter(|&i| particles.kind[i] == ParticleKind::Solid);
+    let add = |mut sums: Vec<Sums>, s: usize| {
+        let (pressure, viscous) = force_on(settings, particles, frame, walls, &pressure, s);
+        let body = particles.body[s] as usize;
+        let arm = particles.position[s] - centers[body];
+        Load::new(&arm, pressure, &(arm + particles.normal[s] * particles.depth[s]), viscous).add_to(&mut sums[body]);
+        sums
     };
-    // Most chunks hold no solid and give an empty vector.
-    let mut sum = parallel::reduce(particles.real, chunk, |mut sum: Vec<Load<D>>, part| {
-        sum.resize(sum.len().max(part.len()), Load::default());
-        sum.iter_mut().zip(&part).for_each(|(sum, part)| sum.merge(part));
-        sum
-    })
-    .unwrap_or_default();
-    sum.resize(centers.len(), Load::default());
-    sum
+    let merge = |mut sums: Vec<Sums>, part: Vec<Sums>| {
+        sums.iter_mut().flatten().zip(part.iter().flatten()).for_each(|(sum, part)| sum.merge(part));
+        sums
+    };
+    solids.fold(none, add).reduce(none, merge).iter().map(Load::of).collect()
 }
 
 /// Pressure and viscous force on solid particle `s`.
@@ -114,11 +120,11 @@ fn force_on<const D: usize>(
     (pressure, viscous)
 }
 
-fn add(sum: &mut [f64; 3], part: [f64; 3]) {
-    sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
+fn components<const D: usize>(v: &Vector<D>) -> [f64; 3] {
+    std::array::from_fn(|k| if k < D { v[k] } else { 0.0 })
 }
 
 fn cross<const D: usize>(a: &Vector<D>, b: &Vector<D>) -> [f64; 3] {
-    let [a, b] = [a, b].map(|v| nalgebra::Vector3::from_fn(|k, _| if k < D { v[k] } else { 0.0 }));
+    let [a, b] = [a, b].map(|v| nalgebra::Vector3::from(components(v)));
     a.cross(&b).into()
 }

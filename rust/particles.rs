@@ -53,6 +53,7 @@ pub struct Particles<const D: usize> {
     pub normal: Vec<Vector<D>>,
     /// Distance of a solid particle below the surface of its body.
     pub depth: Vec<f64>,
+    /// No two alike, and the same however the particles are stored; see [`follower`].
     pub id: Vec<u64>,
 }
 
@@ -72,6 +73,7 @@ macro_rules! each_array {
         $f;
     }};
 }
+#[cfg(feature = "python")]
 pub(crate) use each_array;
 
 impl<const D: usize> Particles<D> {
@@ -125,4 +127,17 @@ impl<const D: usize> Particles<D> {
         }
         counts
     }
+}
+
+/// Bits of an id that an inlet particle shares with those that follow it; those above count them.
+const LINEAGE_BITS: u32 = 40;
+
+/// The id of the particle that follows an inlet particle at the far end of its buffer; None if there are no more.
+pub fn follower(id: u64) -> Option<u64> {
+    id.checked_add(1 << LINEAGE_BITS)
+}
+
+/// What an id shares with those that follow it.
+pub fn lineage(id: u64) -> u64 {
+    id & ((1 << LINEAGE_BITS) - 1)
 }

@@ -326,7 +326,6 @@ fn read_clock(state: &Bound<'_, PyDict>) -> PyResult<Clock> {
         step: scalar(state, "step")?,
         mass_in: scalar(state, "mass_in")?,
         mass_out: scalar(state, "mass_out")?,
-        next_id: scalar(state, "next_id")?,
     })
 }
 
@@ -337,7 +336,6 @@ fn state<'py, const D: usize>(py: Python<'py>, particles: &Particles<D>, clock: 
     dict.set_item("step", clock.step)?;
     dict.set_item("mass_in", clock.mass_in)?;
     dict.set_item("mass_out", clock.mass_out)?;
-    dict.set_item("next_id", clock.next_id)?;
     Ok(dict)
 }
 

@@ -1,7 +1,6 @@
 //! Clock and report: what goes on through a restart, and what is recorded of a step.
 
-use crate::base::Vector;
-use crate::base::parallel;
+use crate::base::{Vector, exact_sums};
 use crate::flow::Step;
 use crate::loads::Load;
 use crate::particles::{ParticleKind, Particles};
@@ -16,8 +15,6 @@ pub struct Clock {
     /// Mass that has crossed the inlet and outlet planes.
     pub mass_in: f64,
     pub mass_out: f64,
-    /// Smallest unused particle id.
-    pub next_id: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -86,12 +83,10 @@ pub fn columns<const D: usize>() -> Vec<(&'static str, Column<D>)> {
 impl<const D: usize> Report<D> {
     /// The report of a step whose iteration has ended and whose particles have not yet been shifted; clock, counts and outcome come after.
     pub fn new(step: Step, particles: &Particles<D>, volume: &[f64], penalty: f64, loads: Vec<Load<D>>) -> Self {
-        let sums = |range: std::ops::Range<usize>| {
-            range
-                .filter(|&i| particles.kind[i] == ParticleKind::Fluid)
-                .fold([0.0; 2], |sums, i| [sums[0] + volume[i], sums[1] + volume[i] * particles.velocity[i].norm_squared()])
-        };
-        let [total, square] = parallel::reduce(particles.real, sums, |a, b| [a[0] + b[0], a[1] + b[1]]).unwrap_or_default();
+        let [total, square] = exact_sums(particles.real, |i| {
+            let fluid = particles.kind[i] == ParticleKind::Fluid;
+            fluid.then(|| [volume[i], volume[i] * particles.velocity[i].norm_squared()])
+        });
         Self {
             clock: Clock::default(),
             time_step: step.time_step,
@@ -114,14 +109,11 @@ fn inlet_pressure<const D: usize>(settings: &Settings, particles: &Particles<D>)
         let planes = [domain.lower[axis], domain.upper[axis]];
         sides.iter().zip(planes).filter(|(side, _)| **side == Boundary::Inlet).map(move |(_, plane)| (axis, plane))
     });
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (axis, plane) in planes {
-        let near = parallel::filter(particles.real, |i| {
-            let near = (particles.position[i][axis] - plane).abs() <= settings.particle_spacing;
-            near && particles.kind[i] != ParticleKind::Solid
-        });
-        sum += near.iter().map(|&i| particles.pressure[i]).sum::<f64>();
-        count += near.len() as f64;
-    }
+    let planes: Vec<_> = planes.collect();
+    let [sum, count] = exact_sums(particles.real, |i| {
+        let near = |&(axis, plane): &(usize, f64)| (particles.position[i][axis] - plane).abs() <= settings.particle_spacing;
+        let planes = planes.iter().filter(|plane| particles.kind[i] != ParticleKind::Solid && near(plane)).count() as f64;
+        (planes > 0.0).then(|| [planes * particles.pressure[i], planes])
+    });
     sum / count
 }

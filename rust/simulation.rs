@@ -12,7 +12,7 @@ use crate::frame::Travel;
 use crate::interpolation::interpolate;
 use crate::loads::loads;
 use crate::neighbours::Grid;
-use crate::particles::{ParticleKind, Particles};
+use crate::particles::{ParticleKind, Particles, follower, lineage};
 use crate::report::{Clock, Report};
 use crate::scheme::{self, Outcome, Scheme};
 use crate::settings::{Boundary, Settings};
@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 /// The adaptive time step may not fall below this fraction of the user's: by then the velocity has blown up.
 const SMALLEST_TIME_STEP: f64 = 1e-4;
 
-/// Particles are put into cell order once in so many steps. The order is part of the state, so a restart keeps it.
+/// Particles are put into cell order once in so many steps, for speed: no result depends on their order.
 const STEPS_BETWEEN_SORTS: u64 = 16;
 
 pub struct Simulation<const D: usize> {
@@ -53,7 +53,7 @@ impl<const D: usize> Simulation<D> {
     pub fn with_scheme(
         settings: Settings,
         mut particles: Particles<D>,
-        mut clock: Clock,
+        clock: Clock,
         threads: Option<usize>,
         scheme: Box<dyn Scheme<D>>,
     ) -> Result<Self> {
@@ -70,7 +70,6 @@ impl<const D: usize> Simulation<D> {
             .map_err(|e| setting("threads", e.to_string()))?;
         // Not with the threads that rayon shares, which a forked process does not have.
         pool.install(|| check_particles(&settings, &mut particles))?;
-        clock.next_id = clock.next_id.max(particles.id.iter().max().map_or(0, |id| id + 1));
         Ok(Self {
             flow: Flow::new(&settings, particles),
             scheme,
@@ -200,8 +199,7 @@ impl<const D: usize> Simulation<D> {
     /// Boundary crossings and clock.
     fn end_step(&mut self, time_step: f64) {
         self.flow.particles.drop_images();
-        let flow =
-            boundary::end_step(&mut self.flow.particles, &self.settings, &self.flow.frame.grid, &mut self.clock.next_id);
+        let flow = boundary::end_step(&mut self.flow.particles, &self.settings, &self.flow.frame.grid);
         self.clock.mass_in += flow.inflow;
         self.clock.mass_out += flow.outflow;
         self.clock.time += time_step;
@@ -354,7 +352,7 @@ fn check_particles<const D: usize>(settings: &Settings, particles: &mut Particle
             return array("position", format!("particle {i} is at {x} in direction {axis}, outside {lower}..{upper}"));
         }
     }
-    check_ids(&particles.id)?;
+    check_ids(particles)?;
     check_spacing(settings, particles)
 }
 
@@ -366,12 +364,22 @@ fn is_beyond_closed_side<const D: usize>(settings: &Settings, position: &Vector<
         || (closed(upper) && position[axis] > settings.domain.upper[axis])
 }
 
-fn check_ids(ids: &[u64]) -> Result<()> {
-    let mut sorted = ids.to_vec();
+/// Refuse ids that stand twice, or would when inlet particles are followed by new ones.
+fn check_ids<const D: usize>(particles: &Particles<D>) -> Result<()> {
+    let refuse = |problem| Err(Error::Array { name: "id", problem });
+    let mut sorted: Vec<_> = (0..particles.len()).map(|i| (lineage(particles.id[i]), particles.id[i], i)).collect();
     sorted.sort_unstable();
-    match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => Err(Error::Array { name: "id", problem: format!("{} stands twice", pair[0]) }),
-        None if sorted.last() == Some(&u64::MAX) => Err(Error::Array { name: "id", problem: "is too large".into() }),
+    for pair in sorted.windows(2) {
+        let [(line, id, i), (next, other, _)] = [pair[0], pair[1]];
+        if id == other {
+            return refuse(format!("{id} stands twice"));
+        }
+        if line == next && particles.kind[i] == ParticleKind::Inlet {
+            return refuse(format!("{other} is one that follows inlet particle {id}: give ids below {}", 1u64 << 40));
+        }
+    }
+    match (0..particles.len()).find(|&i| particles.kind[i] == ParticleKind::Inlet && follower(particles.id[i]).is_none()) {
+        Some(i) => refuse(format!("{} of an inlet particle is too large", particles.id[i])),
         None => Ok(()),
     }
 }
@@ -380,7 +388,7 @@ fn check_ids(ids: &[u64]) -> Result<()> {
 fn check_spacing<const D: usize>(settings: &Settings, particles: &Particles<D>) -> Result<()> {
     const MOST: f64 = 20.0;
     let mut grid = Grid::default();
-    grid.build(&particles.position, settings.support_radius(), settings.bounds());
+    grid.build(&particles.position, &particles.id, settings.support_radius(), settings.bounds());
     let mut candidates = 0;
     particles.position.iter().for_each(|point| grid.for_each_run(&[*point], |run| candidates += run.indices.len()));
     let mean = candidates as f64 / particles.len() as f64;

@@ -28,7 +28,7 @@ fn doubled(points: &[[f64; 2]]) -> Particles<2> {
 }
 
 fn ended(value: &Value, particles: &mut Particles<2>) {
-    end_step(particles, &common::parse(value), &Grid::default(), &mut 1000);
+    end_step(particles, &common::parse(value), &Grid::default());
 }
 
 #[test]
@@ -68,18 +68,17 @@ fn fluid_that_crosses_an_outlet_has_no_pressure_and_counts_as_mass() {
     particles.kind[2..4].fill(ParticleKind::Outlet);
     particles.kind[5..].fill(ParticleKind::Inlet);
     (0..8).for_each(|i| particles.pressure[i] = 1.0 + i as f64);
-    let mut next_id = 100;
-    let flow = end_step(&mut particles, &settings, &Grid::default(), &mut next_id);
+    let flow = end_step(&mut particles, &settings, &Grid::default());
     let mass = 1.7 * SPACING * SPACING;
     assert_relative_eq!(flow.outflow, mass, epsilon = 1e-12);
     assert_relative_eq!(flow.inflow, 2.0 * mass, epsilon = 1e-12);
     // Those that follow have the pressure of the one that they follow, where no other is known.
     assert_eq!(particles.pressure, [0.0, 0.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 6.0, 7.0]);
-    assert_eq!((&particles.id[8..], next_id, particles.real), (&[100, 101][..], 102, 10));
+    assert_eq!((&particles.id[8..], particles.real), (&[5, 6].map(|id| (1 << 40) + id)[..], 10));
     // Without an outlet nothing leaves through it.
     let closed = common::parse(&box_between(json!([["inlet", "none"], ["slip", "slip"]])));
     let mut particles = common::particles(vec![Vector::from([1.01, 1.0])]);
-    assert_eq!(end_step(&mut particles, &closed, &Grid::default(), &mut 1).outflow, 0.0);
+    assert_eq!(end_step(&mut particles, &closed, &Grid::default()).outflow, 0.0);
     assert_eq!(particles.kind, [ParticleKind::Fluid]);
 }
 
@@ -90,7 +89,7 @@ fn particles_go_at_the_end_of_the_outlets_buffer() {
     let end = 1.0 + settings.buffer_length();
     let mut particles = common::particles([end - 0.01, end + 0.01, end + 5.0].map(|x| Vector::from([x, 1.0])).to_vec());
     particles.kind.fill(ParticleKind::Outlet);
-    let flow = end_step(&mut particles, &settings, &Grid::default(), &mut 1000);
+    let flow = end_step(&mut particles, &settings, &Grid::default());
     assert_eq!((&particles.id[..], particles.real, flow.outflow), (&[0][..], 1, 0.0));
 }
 
@@ -105,11 +104,11 @@ fn a_refilled_particle_has_the_pressure_of_the_nearest_inlet_particle() {
     particles.kind[3] = ParticleKind::Fluid;
     (0..6).for_each(|i| particles.pressure[i] = i as f64);
     let mut grid = Grid::default();
-    grid.build(&particles.position, settings.support_radius(), settings.bounds());
+    grid.build(&particles.position, &particles.id, settings.support_radius(), settings.bounds());
     // The last was an image, and is gone.
     particles.real = 5;
     particles.drop_images();
-    end_step(&mut particles, &settings, &grid, &mut 100);
+    end_step(&mut particles, &settings, &grid);
     assert_relative_eq!(particles.position[5], Vector::from([far, 1.0]), epsilon = 1e-12);
     assert_eq!(particles.pressure[5], 2.0);
 }

@@ -47,7 +47,7 @@ fn refusal(change: impl FnOnce(&mut Particles<2>)) -> String {
 fn arrays_that_cannot_be_simulated_are_refused_by_name() {
     let nan = f64::NAN;
     type Change = Box<dyn Fn(&mut Particles<2>)>;
-    let changes: [(&str, Change); 11] = [
+    let changes: [(&str, Change); 12] = [
         ("`kind`: holds no fluid", Box::new(|p| p.kind.fill(ParticleKind::Inlet))),
         ("`position`: of particle 9 is", Box::new(move |p| p.position[9][1] = nan)),
         ("`velocity`: of particle 9 is", Box::new(move |p| p.velocity[9][0] = f64::INFINITY)),
@@ -58,7 +58,18 @@ fn arrays_that_cannot_be_simulated_are_refused_by_name() {
         ("`position`: particle 9 is at -0.01 in direction 1, outside 0..1", Box::new(|p| p.position[9][1] = -0.01)),
         ("`position`: particle 9 is at 1.01 in direction 1, outside 0..1", Box::new(|p| p.position[9][1] = 1.01)),
         ("`id`: 7 stands twice", Box::new(|p| p.id[100] = 7)),
-        ("`id`: is too large", Box::new(|p| p.id[3] = u64::MAX)),
+        (
+            "`id`: 1099511627781 is one that follows inlet particle 5",
+            Box::new(|p| {
+                (p.kind[5], p.id[9]) = (ParticleKind::Inlet, (1 << 40) + 5);
+            }),
+        ),
+        (
+            "`id`: 18446744073709551615 of an inlet particle is too large",
+            Box::new(|p| {
+                (p.kind[3], p.id[3]) = (ParticleKind::Inlet, u64::MAX);
+            }),
+        ),
     ];
     for (text, change) in changes {
         let error = refusal(change);
@@ -68,9 +79,8 @@ fn arrays_that_cannot_be_simulated_are_refused_by_name() {
     let (value, mut particles) = channel();
     (particles.position[8][1], particles.position[9][1]) = (0.0, 1.0);
     (particles.kind[10], particles.position[10][1]) = (ParticleKind::Solid, -0.2);
-    (particles.body[8], particles.id[8]) = (7, u64::MAX - 1);
-    let mut simulation = begun(&value, particles, Clock { next_id: 5, ..Clock::default() }).expect("valid");
-    assert_eq!(simulation.clock().next_id, u64::MAX);
+    (particles.body[8], particles.id[8]) = (7, u64::MAX);
+    let mut simulation = begun(&value, particles, Clock::default()).expect("valid");
     // A solid particle has the velocity of its body.
     assert_eq!(simulation.particles().velocity[10], Vector::<2>::zeros());
     assert!(simulation.look_at_failed(|_| ()).is_none());

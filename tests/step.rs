@@ -552,12 +552,12 @@ fn a_refilled_particle_has_the_pressure_of_its_surroundings() {
     let pressure = |x: &Vector<2>| 3.0 + x[0] + 0.1 * x[1];
     (0..80).for_each(|i| particles.pressure[i] = pressure(&particles.position[i]));
     let mut grid = Grid::default();
-    grid.build(&particles.position, settings.support_radius(), settings.bounds());
+    grid.build(&particles.position, &particles.id, settings.support_radius(), settings.bounds());
     // One has crossed the inlet.
     let crossing = 8 * 4;
     particles.position[crossing][0] = 0.01;
-    end_step(&mut particles, &settings, &grid, &mut 100);
-    let new = particles.id.iter().position(|&id| id == 100).expect("one follows");
+    end_step(&mut particles, &settings, &grid);
+    let new = particles.id.iter().position(|&id| id == (1 << 40) + crossing as u64).expect("one follows");
     let last = crossing + 7;
     assert_relative_eq!(particles.position[new], Vector::from([-0.79, 0.45]), epsilon = 1e-12);
     assert_eq!(particles.pressure[new], pressure(&particles.position[last]));

@@ -2,8 +2,10 @@
 
 mod algebra;
 pub mod error;
+mod exact_sum;
 pub mod lanes;
 pub mod parallel;
 
 pub use algebra::{Matrix, Vector};
 pub use error::{Error, Result};
+pub use exact_sum::{ExactSum, exact_sums};

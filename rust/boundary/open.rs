@@ -3,7 +3,7 @@
 use crate::base::Vector;
 use crate::base::parallel;
 use crate::neighbours::Grid;
-use crate::particles::{ParticleKind, Particles};
+use crate::particles::{ParticleKind, Particles, follower};
 use crate::settings::{Boundary, Settings};
 
 /// Mass that crossed the inlet and outlet planes.
@@ -15,12 +15,7 @@ pub struct MassFlow {
 
 /// Turn, wrap, add and remove the particles that have crossed a side. `particles` hold no images; `grid` is of their
 /// positions before the step.
-pub fn end_step<const D: usize>(
-    particles: &mut Particles<D>,
-    settings: &Settings,
-    grid: &Grid<D>,
-    next_id: &mut u64,
-) -> MassFlow {
+pub fn end_step<const D: usize>(particles: &mut Particles<D>, settings: &Settings, grid: &Grid<D>) -> MassFlow {
     let sides = sides(settings);
     let of = |kind| sides.iter().filter(|side| side.kind == kind).copied().collect::<Vec<_>>();
     // Most particles are inside, and stay what they are.
@@ -31,7 +26,7 @@ pub fn end_step<const D: usize>(
     of(Boundary::Slip).iter().for_each(|side| side.reflect(particles, &near));
     of(Boundary::Periodic).iter().for_each(|side| side.wrap(particles, &near, settings));
     let (left, gone) = leave(particles, &near, &of(Boundary::Outlet), settings.buffer_length());
-    let entered = enter(particles, &near, &of(Boundary::Inlet), settings, grid, next_id);
+    let entered = enter(particles, &near, &of(Boundary::Inlet), settings, grid);
     if !gone.is_empty() {
         let mut keep = vec![true; particles.real];
         gone.into_iter().for_each(|i| keep[i] = false);
@@ -116,7 +111,6 @@ fn enter<const D: usize>(
     inlets: &[Side],
     settings: &Settings,
     grid: &Grid<D>,
-    next_id: &mut u64,
 ) -> usize {
     let crossed = |i: usize| match particles.kind[i] {
         ParticleKind::Inlet => outermost(inlets, &particles.position[i]).filter(|(inside, _)| *inside >= 0.0),
@@ -128,8 +122,7 @@ fn enter<const D: usize>(
         let new = particles.push_copy(i);
         particles.position[new] = position;
         particles.pressure[new] = pressure;
-        particles.id[new] = *next_id;
-        *next_id += 1;
+        particles.id[new] = follower(particles.id[i]).expect("fewer than 2^24 follow each other");
         particles.kind[i] = ParticleKind::Fluid;
     }
     particles.real = particles.len();

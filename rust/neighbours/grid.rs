@@ -1,8 +1,8 @@
-//! Cells at least half as wide as the search radius; points are listed by cell with a counting sort.
+//! Cells at least half as wide as the search radius; points are listed by cell with a counting sort, those of a cell by their keys. So
+//! the order of neighbours, in which sums are formed, does not depend on how the points are stored.
 
 use crate::base::Vector;
 use crate::base::parallel;
-use std::ops::Range;
 
 /// Cells that the search radius reaches to either side: narrow cells fit the sphere closer than wide ones.
 const REACH: usize = 2;
@@ -17,7 +17,7 @@ pub struct Grid<const D: usize> {
     cells: [usize; D],
     /// First entry of `items` of each cell, and the end.
     starts: Vec<u32>,
-    /// Point indices sorted by cell (first direction fastest), then by index.
+    /// Point indices sorted by cell (first direction fastest), then by key, then by index.
     items: Vec<u32>,
     /// The coordinates of the points in the order of `items`, one array a direction.
     coordinates: [Vec<f64>; D],
@@ -47,19 +47,13 @@ impl<const D: usize> Default for Grid<D> {
 }
 
 impl<const D: usize> Grid<D> {
-    /// Sort `points` for searches within `radius`. Cells cover the box `bounds` at most: points beyond share its border cells,
-    /// so that strays cost no memory.
-    pub fn build(&mut self, points: &[Vector<D>], radius: f64, bounds: (Vector<D>, Vector<D>)) {
-        let Some(&first) = points.first() else {
+    /// Sort `points`, each with its key, for searches within `radius`. Cells cover the box `bounds`, and no more: points beyond
+    /// share its border cells, so that strays cost no memory.
+    pub fn build(&mut self, points: &[Vector<D>], keys: &[u64], radius: f64, (lower, upper): (Vector<D>, Vector<D>)) {
+        if points.is_empty() {
             *self = Self::default();
             return;
-        };
-        let corners = |range: Range<usize>| {
-            points[range].iter().fold((first, first), |(low, high), point| (low.inf(point), high.sup(point)))
-        };
-        let (lower, upper) =
-            parallel::reduce(points.len(), corners, |a, b| (a.0.inf(&b.0), a.1.sup(&b.1))).unwrap_or((first, first));
-        let (lower, upper) = (lower.sup(&bounds.0), upper.inf(&bounds.1));
+        }
         self.origin = lower;
         // A hair wider, so that rounding cannot put a neighbour one cell farther away.
         let mut width = radius / REACH as f64 * (1.0 + 1e-9);
@@ -71,10 +65,10 @@ impl<const D: usize> Grid<D> {
         let counts = cells(width);
         self.cells = std::array::from_fn(|axis| counts[axis] as usize);
         self.inverse_width = 1.0 / width;
-        self.counting_sort(points);
+        self.counting_sort(points, keys);
     }
 
-    fn counting_sort(&mut self, points: &[Vector<D>]) {
+    fn counting_sort(&mut self, points: &[Vector<D>], keys: &[u64]) {
         self.starts.clear();
         self.starts.resize(self.cells.iter().product::<usize>() + 1, 0);
         let mut cell_of = std::mem::take(&mut self.cell_of);
@@ -93,6 +87,7 @@ impl<const D: usize> Grid<D> {
         // Each start has moved on to its end, which is the next cell's start.
         self.starts.rotate_right(1);
         self.starts[0] = 0;
+        sort_cells(&mut self.items, &self.starts, keys);
         for (axis, coordinates) in self.coordinates.iter_mut().enumerate() {
             coordinates.resize(points.len(), 0.0);
             parallel::for_each(coordinates, |k, x| *x = points[self.items[k] as usize][axis]);
@@ -100,7 +95,7 @@ impl<const D: usize> Grid<D> {
         self.cell_of = cell_of;
     }
 
-    /// Point indices sorted by cell, then by index.
+    /// Point indices sorted by cell, then by key, then by index.
     pub fn order(&self) -> &[u32] {
         &self.items
     }
@@ -171,5 +166,24 @@ impl<const D: usize> Grid<D> {
     #[inline(always)]
     fn flat(&self, cell: [usize; D]) -> usize {
         cell.iter().zip(&self.cells).rev().fold(0, |flat, (&c, &n)| flat * n + c)
+    }
+}
+
+/// Cells that are sorted one after the other.
+const CELLS: usize = 1024;
+
+/// Sort the items of each cell by their keys; those with the same one stay in order. `starts` are those of the cells, and the end.
+fn sort_cells(items: &mut [u32], starts: &[u32], keys: &[u64]) {
+    let cells = starts.len() - 1;
+    if cells > CELLS {
+        let (lower, upper) = items.split_at_mut((starts[cells / 2] - starts[0]) as usize);
+        rayon::join(|| sort_cells(lower, &starts[..=cells / 2], keys), || sort_cells(upper, &starts[cells / 2..], keys));
+        return;
+    }
+    for cell in starts.windows(2) {
+        let items = &mut items[(cell[0] - starts[0]) as usize..(cell[1] - starts[0]) as usize];
+        if !items.is_sorted_by_key(|&item| keys[item as usize]) {
+            items.sort_by_key(|&item| keys[item as usize]);
+        }
     }
 }

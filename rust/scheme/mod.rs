@@ -5,6 +5,7 @@ mod projection;
 mod viscous;
 mod weakly_compressible;
 
+use crate::base::exact_sums;
 use crate::base::parallel;
 use crate::flow::{Flow, Step};
 use crate::particles::{ParticleKind, Particles};
@@ -67,16 +68,12 @@ impl Outcome {
         iterations: usize,
         divergence: impl Fn(usize) -> f64 + Sync,
     ) -> Self {
-        let norms = |range: std::ops::Range<usize>| {
-            range.filter(|&i| particles.kind[i] == ParticleKind::Fluid).fold((0.0, 0.0), |(max, sum): (f64, f64), i| {
-                let value = divergence(i).abs();
-                // NaN must not hide behind max, which drops it.
-                (if value > max || value.is_nan() { value } else { max }, sum + value)
-            })
-        };
+        let size = |i: usize| (particles.kind[i] == ParticleKind::Fluid).then(|| divergence(i).abs());
+        // NaN must not hide behind max, which drops it.
         let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
-        let (divergence_max, divergence_sum) =
-            parallel::reduce(particles.real, norms, |a, b| (larger(a.0, b.0), a.1 + b.1)).unwrap_or_default();
+        let largest = |range: std::ops::Range<usize>| range.filter_map(size).fold(0.0, larger);
+        let divergence_max = parallel::reduce(particles.real, largest, larger).unwrap_or_default();
+        let [divergence_sum] = exact_sums(particles.real, |i| size(i).map(|size| [size]));
         let converged = divergence_max <= settings.divergence_tolerance;
         Self { iterations, converged, divergence_max, divergence_sum }
     }
