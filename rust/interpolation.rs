@@ -1,14 +1,17 @@
-//! Values of the fluid at any point: linear moving least squares.
+//! Values of the fluid at any point: quadratic moving least squares.
 
 use crate::base::Vector;
 use crate::frame::Frame;
 use crate::kernel::{Smoothing, with_kernel};
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-/// Pressure and velocity at `point` from the fluid around it that is seen from there, exact for linear fields; None where no fluid is
-/// near.
+/// Largest sum of the moduli of the weights of a quadratic fit, which are those of values that sum to one.
+const LARGEST_AMPLIFICATION: f64 = 4.0;
+
+/// Pressure and velocity at `point` from the fluid around it that is seen from there, exact for quadratic fields, for linear
+/// ones where few particles are near; None where no fluid is near.
 pub fn interpolate<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
@@ -36,8 +39,8 @@ pub fn interpolate<const D: usize>(
     Some((pressure, velocity))
 }
 
-/// The weight of each particle in `near` in the interpolated value: that of the fit of a linear field, whose slope in directions that too
-/// few or collinear particles do not tell of is taken as zero.
+/// The weight of each particle in `near` in the interpolated value: that of the fit of a quadratic field, or of a linear one where that of
+/// a quadratic one would make too much of what the particles differ by.
 fn shape_functions<const D: usize>(
     near: &[usize],
     radius: f64,
@@ -45,22 +48,35 @@ fn shape_functions<const D: usize>(
     point: &Vector<D>,
     weight: impl Fn(&Vector<D>, f64) -> f64,
 ) -> Option<Vec<f64>> {
-    let away = |j: usize| (particles.position[j] - point) / radius;
-    let weights: Vec<f64> = near.iter().map(|&j| weight(&particles.position[j], radius * away(j).norm())).collect();
+    let away: Vec<_> = near.iter().map(|&j| (particles.position[j] - point) / radius).collect();
+    let weights: Vec<f64> =
+        near.iter().zip(&away).map(|(&j, away)| weight(&particles.position[j], radius * away.norm())).collect();
     let total: f64 = weights.iter().sum();
     if total <= 0.0 {
         return None;
     }
-    // About the mean of the places, where the fit is the mean of the values whatever its slope.
-    let mean = near.iter().zip(&weights).map(|(&j, w)| away(j) * (w / total)).sum::<Vector<D>>();
-    let mut moments = DMatrix::zeros(D, D);
-    for (&j, w) in near.iter().zip(&weights) {
-        let r = away(j) - mean;
-        moments += r * r.transpose() * *w;
+    let linear = |r: &Vector<D>| DVector::from_column_slice(r.as_slice());
+    let products = |r: &Vector<D>| (0..D).flat_map(|k| (0..=k).map(move |l| [k, l])).map(|[k, l]| r[k] * r[l]).collect::<Vec<_>>();
+    let quadratic = |r: &Vector<D>| DVector::from_iterator(D * (D + 3) / 2, r.iter().copied().chain(products(r)));
+    let fitted = fit(&away.iter().map(quadratic).collect::<Vec<_>>(), &weights, total);
+    let amplified = fitted.iter().map(|weight| weight.abs()).sum::<f64>() > LARGEST_AMPLIFICATION;
+    Some(if amplified { fit(&away.iter().map(linear).collect::<Vec<_>>(), &weights, total) } else { fitted })
+}
+
+/// What each value counts in the value at the point of the least-squares fit of one and functions that vanish there; those that too
+/// few particles, or collinear ones, do not tell of are taken as zero.
+fn fit(functions: &[DVector<f64>], weights: &[f64], total: f64) -> Vec<f64> {
+    let count = functions[0].len();
+    // About the mean, where the fit is the mean of the values whatever its coefficients.
+    let mean = functions.iter().zip(weights).fold(DVector::zeros(count), |mean, (f, w)| mean + f * (w / total));
+    let mut moments = DMatrix::zeros(count, count);
+    for (f, w) in functions.iter().zip(weights) {
+        let deviation = f - &mean;
+        moments.ger(*w, &deviation, &deviation, 1.0);
     }
     // Not by singular values: nalgebra's are wrong by 4e-4 for some matrices of three dimensions.
     let SymmetricEigen { eigenvalues, eigenvectors } = moments.symmetric_eigen();
     let told = eigenvalues.map(|value| if value > 1e-6 * total { 1.0 / value } else { 0.0 });
-    let slope = &eigenvectors * (eigenvectors.transpose() * mean).component_mul(&told);
-    Some(near.iter().zip(&weights).map(|(&j, w)| w * (1.0 / total - (away(j) - mean).dot(&slope))).collect())
+    let slope = &eigenvectors * (eigenvectors.transpose() * &mean).component_mul(&told);
+    functions.iter().zip(weights).map(|(f, w)| w * (1.0 / total - (f - &mean).dot(&slope))).collect()
 }

@@ -6,13 +6,12 @@
 //! The viscous pairs feel the slope of the velocity over the width of a kernel. Where
 //! the velocity's slope at the surface is known, the viscous part is its shear over the area of the surface, and the pressure part the rest.
 
-use crate::base::parallel::CHUNK;
+use crate::base::parallel;
 use crate::base::{ExactSum, Vector};
 use crate::boundary::{Walls, surface_area};
 use crate::frame::Frame;
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
-use rayon::prelude::*;
 
 /// Force and torque on one body. In 2-D the torque's only component is the last one.
 #[derive(Clone, Copy, Debug)]
@@ -70,21 +69,22 @@ pub fn loads<const D: usize>(
     pressure: impl Fn(usize) -> f64 + Sync,
 ) -> Vec<Load<D>> {
     let centers: Vec<_> = settings.bodies.iter().map(|body| Vector::<D>::from_column_slice(&body.center)).collect();
-    let none = || vec![Sums::default(); centers.len()];
-    let solids =
-        (0..particles.real).into_par_iter().with_min_len(CHUNK).filter(|&i| particles.kind[i] == ParticleKind::Solid);
-    let add = |mut sums: Vec<Sums>, s: usize| {
-        let (pressure, viscous) = force_on(settings, particles, frame, walls, &pressure, s);
-        let body = particles.body[s] as usize;
-        let arm = particles.position[s] - centers[body];
-        Load::new(&arm, pressure, &(arm + particles.normal[s] * particles.depth[s]), viscous).add_to(&mut sums[body]);
-        sums
+    let add = |sums: &mut Vec<Sums>, s: usize| {
+        if particles.kind[s] == ParticleKind::Solid {
+            sums.resize_with(centers.len(), Sums::default);
+            let (pressure, viscous) = force_on(settings, particles, frame, walls, &pressure, s);
+            let body = particles.body[s] as usize;
+            let arm = particles.position[s] - centers[body];
+            Load::new(&arm, pressure, &(arm + particles.normal[s] * particles.depth[s]), viscous).add_to(&mut sums[body]);
+        }
     };
-    let merge = |mut sums: Vec<Sums>, part: Vec<Sums>| {
+    // Most chunks hold no solid and give an empty vector.
+    let mut sums = parallel::accumulate(particles.real, Vec::new, add, |sums, part| {
+        sums.resize_with(sums.len().max(part.len()), Sums::default);
         sums.iter_mut().flatten().zip(part.iter().flatten()).for_each(|(sum, part)| sum.merge(part));
-        sums
-    };
-    solids.fold(none, add).reduce(none, merge).iter().map(Load::of).collect()
+    });
+    sums.resize_with(centers.len(), Sums::default);
+    sums.iter().map(Load::of).collect()
 }
 
 /// Pressure and viscous force on solid particle `s`.

@@ -153,7 +153,7 @@ impl PySimulation {
         engine!(&self.0, s => state(py, s.particles(), s.clock()))
     }
 
-    /// Fluid ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d), linear moving least squares; NaN without neighbours.
+    /// Fluid ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d), quadratic moving least squares; NaN without neighbours.
     fn sample<'py>(&mut self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
         engine!(&mut self.0, s => {
             let points = read_vectors("points", points)?;

@@ -5,15 +5,28 @@ use approx::assert_relative_eq;
 
 mod common;
 
+type Field<const D: usize> = fn(&Vector<D>) -> (f64, Vector<D>);
+
 /// p and u of linear fields.
 fn linear<const D: usize>(x: &Vector<D>) -> (f64, Vector<D>) {
     let slope = Vector::<D>::from_fn(|k, _| [0.7, -1.1, 0.4][k]);
     (0.3 + slope.dot(x), Vector::from_fn(|k, _| 0.2 - slope[k] * x[(k + 1) % D]))
 }
 
-fn sampled<const D: usize>(spacing: f64, mut particles: Particles<D>, points: &[Vector<D>]) -> Vec<(f64, Vector<D>)> {
+/// Those of quadratic fields.
+fn quadratic<const D: usize>(x: &Vector<D>) -> (f64, Vector<D>) {
+    let (p, u) = linear(x);
+    (p - 2.0 * x[0] * x[1] + x[D - 1].powi(2), Vector::from_fn(|k, _| u[k] * x[0] + x[k].powi(2)))
+}
+
+fn sampled<const D: usize>(
+    field: Field<D>,
+    spacing: f64,
+    mut particles: Particles<D>,
+    points: &[Vector<D>],
+) -> Vec<(f64, Vector<D>)> {
     for i in 0..particles.real {
-        let (p, u) = linear(&particles.position[i]);
+        let (p, u) = field(&particles.position[i]);
         // What solids have says nothing of the fluid.
         let fluid = particles.kind[i] == ParticleKind::Fluid;
         (particles.pressure[i], particles.velocity[i]) = if fluid { (p, u) } else { (1e3, Vector::repeat(1e3)) };
@@ -23,22 +36,35 @@ fn sampled<const D: usize>(spacing: f64, mut particles: Particles<D>, points: &[
     simulation.sample(points)
 }
 
-fn linear_fields_are_exact<const D: usize>(side: usize) {
+fn fields_are_exact<const D: usize>(field: Field<D>, side: usize) {
     let mut particles = common::particles(common::lattice::<D>(side, 0.3));
     particles.kind.iter_mut().step_by(5).for_each(|kind| *kind = ParticleKind::Solid);
     // At the sides of the box, too.
     let points: Vec<_> = common::lattice::<D>(5, 0.9).into_iter().map(|x| x.map(|x| x.clamp(0.0, 1.0))).collect();
-    for (point, (p, u)) in points.iter().zip(sampled(1.0 / side as f64, particles, &points)) {
-        let exact = linear(point);
+    for (point, (p, u)) in points.iter().zip(sampled(field, 1.0 / side as f64, particles, &points)) {
+        let exact = field(point);
         assert_relative_eq!(p, exact.0, epsilon = 1e-10);
         assert_relative_eq!(u, exact.1, epsilon = 1e-10);
     }
 }
 
 #[test]
-fn linear_fields_are_sampled_exactly() {
-    linear_fields_are_exact::<2>(14);
-    linear_fields_are_exact::<3>(8);
+fn linear_and_quadratic_fields_are_sampled_exactly() {
+    fields_are_exact::<2>(linear, 14);
+    fields_are_exact::<3>(linear, 8);
+    fields_are_exact::<2>(quadratic, 14);
+    fields_are_exact::<3>(quadratic, 8);
+}
+
+/// Values that scatter, as those of a pressure do, scatter no more than four times as much where they are sampled, far outside too.
+#[test]
+fn sampling_makes_little_of_noise() {
+    let noise: Field<2> = |x| ((1e4 * x[0]).sin() * (1.7e4 * x[1]).cos(), Vector::zeros());
+    let points: Vec<_> = (0..40).map(|k| Vector::from([0.37, 1.25 - 0.02 * k as f64])).collect();
+    for disorder in [0.0, 0.3] {
+        let values = sampled(noise, 1.0 / 14.0, common::particles(common::lattice::<2>(14, disorder)), &points);
+        assert!(values.iter().all(|(p, _)| p.is_nan() || p.abs() < 4.0), "{values:?}");
+    }
 }
 
 #[test]
@@ -46,14 +72,14 @@ fn where_no_fluid_is_near_there_is_no_value() {
     // One particle with a support radius of 0.4: all that is known are its own values.
     let lone = Vector::from([0.5, 0.5]);
     let points = [[0.5, 0.5], [0.5, 0.89], [0.5, 0.91], [f64::NAN, 0.5], [0.5, f64::INFINITY]].map(Vector::from);
-    let values = sampled(0.1, common::particles(vec![lone]), &points);
+    let values = sampled(linear, 0.1, common::particles(vec![lone]), &points);
     for (p, u) in &values[..2] {
         assert_relative_eq!(*p, linear(&lone).0, epsilon = 1e-12);
         assert_relative_eq!(*u, linear(&lone).1, epsilon = 1e-12);
     }
     // Of a row of particles, how the values change along it.
     let row = (0..9).map(|k| Vector::from([0.1 * k as f64 + 0.05, 0.5])).collect();
-    for (p, u) in sampled(0.1, common::particles(row), &[Vector::from([0.42, 0.6])]) {
+    for (p, u) in sampled(linear, 0.1, common::particles(row), &[Vector::from([0.42, 0.6])]) {
         let exact = linear(&Vector::from([0.42, 0.5]));
         assert_relative_eq!(p, exact.0, epsilon = 1e-12);
         assert_relative_eq!(u, exact.1, epsilon = 1e-12);

@@ -21,6 +21,7 @@ const FACTORS: [(&str, &[&str]); 18] = [
             "body between periodic sides",
             "body across a periodic side",
             "body across a slip side",
+            "plate of two faces",
             "walls all around",
             "no solids",
         ],
@@ -183,6 +184,12 @@ fn add<const D: usize>(
     for axis in (0..D).filter(|&axis| sides[axis] == "walls") {
         into_wall[axis] = position[axis] - position[axis].clamp(0.0, 1.0);
     }
+    if let Some(faces) = plate(configuration, &position, spacing) {
+        for (depth, outward) in faces {
+            push(particles, ParticleKind::Solid, 2, position, Vector::zeros(), depth, outward);
+        }
+        return;
+    }
     let (depth, outward) = match body(configuration, &position, spacing) {
         Some((depth, outward)) => (depth, outward),
         None => (into_wall.norm(), -into_wall.try_normalize(0.0).unwrap_or_else(Vector::zeros)),
@@ -200,13 +207,34 @@ fn add<const D: usize>(
     let mean = if ["periodic", "open"].contains(&sides[0]) { 0.6 } else { 0.0 };
     let mut velocity = Vector::zeros();
     (velocity[0], velocity[1]) = (mean + 0.3 * x.sin() * y.cos(), -0.3 * x.cos() * y.sin());
-    particles.velocity.push(velocity);
-    particles.pressure.push(0.05 * (x.cos() + y.cos()));
-    particles.body.push(if into_wall.norm() == 0.0 { 2 } else { u16::from(into_wall[1] > 0.0) } * u16::from(depth > 0.0));
+    let body = if into_wall.norm() == 0.0 { 2 } else { u16::from(into_wall[1] > 0.0) } * u16::from(depth > 0.0);
+    push(particles, kind, body, position, velocity, depth, outward);
+}
+
+fn push<const D: usize>(
+    particles: &mut Particles<D>,
+    kind: ParticleKind,
+    body: u16,
+    position: Vector<D>,
+    velocity: Vector<D>,
+    depth: f64,
+    normal: Vector<D>,
+) {
     particles.kind.push(kind);
-    particles.depth.push(depth);
-    particles.normal.push(outward);
+    particles.body.push(body);
     particles.position.push(position);
+    particles.velocity.push(velocity);
+    particles.pressure.push(0.05 * ((TAU * position[0]).cos() + (TAU * position[1]).cos()));
+    particles.depth.push(depth);
+    particles.normal.push(normal);
+}
+
+/// Depths below the two faces of a plate across the flow, three layers thick, and the normals there, if `position` is inside.
+fn plate<const D: usize>(configuration: &Configuration, position: &Vector<D>, spacing: f64) -> Option<[(f64, Vector<D>); 2]> {
+    let along = position[0] - (0.5 + 0.5 * spacing);
+    let inside = along.abs() < 1.2 * spacing && (position[1] - 0.5).abs() < 0.25;
+    let face = |side: f64| (1.5 * spacing - side * along, Vector::from_fn(|axis, _| if axis == 0 { side } else { 0.0 }));
+    (choice(configuration, "layout").contains("plate") && inside).then(|| [face(1.0), face(-1.0)])
 }
 
 /// Depth below the surface of the body, and the normal there, if `position` is inside.

@@ -59,7 +59,7 @@ class Simulation:
         """All that is needed to go on from here to the last bit."""
 
     def sample(self, points: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Fluid ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d), by linear moving least squares.
+        """Fluid ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d), by quadratic moving least squares.
 
         NaN without neighbours.
         """

@@ -1,8 +1,7 @@
 //! Sums that do not depend on the order of their terms, nor on how they are split: every term is added as the whole number of the least
 //! f64 that it is (Kulisch), in digits that integer addition merges.
 
-use crate::base::parallel::CHUNK;
-use rayon::prelude::*;
+use crate::base::parallel;
 
 /// Digits of 32 bits: enough for all that an f64 can be, 2^-1074 to 2^1024, and for the carries of as many terms as an i64 counts.
 const DIGITS: usize = 68;
@@ -85,14 +84,13 @@ fn scaled(value: f64, power: i32) -> f64 {
 /// The N sums over `0..count` of what `terms` gives for an index, if anything, in parallel.
 pub fn exact_sums<const N: usize>(count: usize, terms: impl Fn(usize) -> Option<[f64; N]> + Sync + Send) -> [f64; N] {
     let none = || std::array::from_fn::<_, N, _>(|_| ExactSum::default());
-    let add = |mut sums: [ExactSum; N], terms: [f64; N]| {
-        sums.iter_mut().zip(terms).for_each(|(sum, term)| sum.add(term));
-        sums
+    let add = |sums: &mut [ExactSum; N], i: usize| {
+        if let Some(terms) = terms(i) {
+            sums.iter_mut().zip(terms).for_each(|(sum, term)| sum.add(term));
+        }
     };
-    let merge = |mut sums: [ExactSum; N], part: [ExactSum; N]| {
+    parallel::accumulate(count, none, add, |sums, part| {
         sums.iter_mut().zip(&part).for_each(|(sum, part)| sum.merge(part));
-        sums
-    };
-    let terms = (0..count).into_par_iter().with_min_len(CHUNK).filter_map(terms);
-    terms.fold(none, add).reduce(none, merge).map(|sum| sum.value())
+    })
+    .map(|sum| sum.value())
 }

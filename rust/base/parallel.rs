@@ -16,6 +16,25 @@ pub fn reduce<R: Send>(count: usize, map: impl Fn(Range<usize>) -> R + Sync + Se
         .reduce(fold)
 }
 
+/// Add every index of `0..count` to one of several of what `none` begins with, in parallel, and merge these: for sums that no order
+/// and no split changes.
+pub fn accumulate<R: Send>(
+    count: usize,
+    none: impl Fn() -> R + Sync + Send,
+    add: impl Fn(&mut R, usize) + Sync + Send,
+    merge: impl Fn(&mut R, R) + Sync + Send,
+) -> R {
+    let chunks = (0..count.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
+        let mut sum = none();
+        (chunk * CHUNK..((chunk + 1) * CHUNK).min(count)).for_each(|i| add(&mut sum, i));
+        sum
+    });
+    chunks.reduce(&none, |mut sum, part| {
+        merge(&mut sum, part);
+        sum
+    })
+}
+
 /// `f(i, &mut out[i])` for every entry, in parallel.
 pub fn for_each<T: Send>(out: &mut [T], f: impl Fn(usize, &mut T) + Sync + Send) {
     out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {

@@ -16,7 +16,7 @@ class Problem:
     settings
         The engine's settings (see docs/architecture.md).
     state
-        The particles, one array a property, and optionally ``time``, ``step``, ``mass_in``, ``mass_out``, ``next_id``.
+        The particles, one array a property, and optionally ``time``, ``step``, ``mass_in``, ``mass_out``.
     coefficient_bodies
         Names of the bodies whose force coefficients are reported, all together.
     """

@@ -278,7 +278,7 @@ class Simulation:
         dict
             ``position``, ``velocity``, ``normal`` (n, d), ``pressure``, ``volume``, ``velocity_divergence``, ``kind``,
             ``body``, ``depth``, ``id`` (n,) and ``vorticity``, (n,) in 2-D and (n, 3) in 3-D; and the numbers ``time``,
-            ``step``, ``mass_in``, ``mass_out`` and ``next_id``.
+            ``step``, ``mass_in`` and ``mass_out``.
         """
         with self._engine() as engine:
             return engine.snapshot()
