@@ -7,8 +7,8 @@ use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-/// Largest sum of the moduli of the weights of a quadratic fit, which are those of values that sum to one.
-const LARGEST_AMPLIFICATION: f64 = 4.0;
+/// Largest sum of the moduli of the weights of a fit, whose sum is one.
+const LARGEST_AMPLIFICATION: f64 = 8.0;
 
 /// Pressure and velocity at `point` from the fluid around it that is seen from there, exact for quadratic fields, for linear
 /// ones where few particles are near; None where no fluid is near.
@@ -39,8 +39,8 @@ pub fn interpolate<const D: usize>(
     Some((pressure, velocity))
 }
 
-/// The weight of each particle in `near` in the interpolated value: that of the fit of a quadratic field, or of a linear one where that of
-/// a quadratic one would make too much of what the particles differ by.
+/// The weight of each particle in `near` in the interpolated value: that of the fit of a quadratic field or, where that would make too much
+/// of what the particles differ by, as far outside, of a linear one, or of the mean.
 fn shape_functions<const D: usize>(
     near: &[usize],
     radius: f64,
@@ -55,12 +55,19 @@ fn shape_functions<const D: usize>(
     if total <= 0.0 {
         return None;
     }
-    let linear = |r: &Vector<D>| DVector::from_column_slice(r.as_slice());
-    let products = |r: &Vector<D>| (0..D).flat_map(|k| (0..=k).map(move |l| [k, l])).map(|[k, l]| r[k] * r[l]).collect::<Vec<_>>();
-    let quadratic = |r: &Vector<D>| DVector::from_iterator(D * (D + 3) / 2, r.iter().copied().chain(products(r)));
-    let fitted = fit(&away.iter().map(quadratic).collect::<Vec<_>>(), &weights, total);
-    let amplified = fitted.iter().map(|weight| weight.abs()).sum::<f64>() > LARGEST_AMPLIFICATION;
-    Some(if amplified { fit(&away.iter().map(linear).collect::<Vec<_>>(), &weights, total) } else { fitted })
+    // r_k, then r_k r_l.
+    let functions = |r: &Vector<D>, count: usize| {
+        let products = (0..D).flat_map(|k| (0..=k).map(move |l| r[k] * r[l]));
+        DVector::from_iterator(count, r.iter().copied().chain(products).take(count))
+    };
+    let fits = [D * (D + 3) / 2, D].map(|count| {
+        let functions: Vec<_> = away.iter().map(|r| functions(r, count)).collect();
+        fit(&functions, &weights, total)
+    });
+    let amplification = |fit: &Vec<f64>| fit.iter().map(|weight| weight.abs()).sum::<f64>();
+    let [quadratic, linear] = fits;
+    let sound = [quadratic, linear].into_iter().find(|fit| amplification(fit) < LARGEST_AMPLIFICATION);
+    Some(sound.unwrap_or_else(|| weights.iter().map(|w| w / total).collect()))
 }
 
 /// What each value counts in the value at the point of the least-squares fit of one and functions that vanish there; those that too

@@ -230,10 +230,16 @@ fn push<const D: usize>(
 }
 
 /// Depths below the two faces of a plate across the flow, three layers thick, and the normals there, if `position` is inside.
-fn plate<const D: usize>(configuration: &Configuration, position: &Vector<D>, spacing: f64) -> Option<[(f64, Vector<D>); 2]> {
+fn plate<const D: usize>(
+    configuration: &Configuration,
+    position: &Vector<D>,
+    spacing: f64,
+) -> Option<[(f64, Vector<D>); 2]> {
     let along = position[0] - (0.5 + 0.5 * spacing);
-    let inside = along.abs() < 1.2 * spacing && (position[1] - 0.5).abs() < 0.25;
-    let face = |side: f64| (1.5 * spacing - side * along, Vector::from_fn(|axis, _| if axis == 0 { side } else { 0.0 }));
+    let from_end = (0.25 / spacing).floor() * spacing - (position[1] - 0.5).abs();
+    let inside = along.abs() < 1.2 * spacing && from_end > 0.0;
+    let outward = |side: f64| Vector::from_fn(|axis, _| if axis == 0 { side } else { 0.0 });
+    let face = |side: f64| ((1.5 * spacing - side * along).min(from_end), outward(side));
     (choice(configuration, "layout").contains("plate") && inside).then(|| [face(1.0), face(-1.0)])
 }
 

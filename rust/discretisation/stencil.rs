@@ -249,10 +249,21 @@ const BLOCK: usize = 32;
 impl<K: Kernel, const D: usize> VisitMut<f64, (), ()> for Volumes<'_, K, D> {
     #[inline(always)]
     fn visit<V: Lanes>(&self, cluster: Cluster, row: RowMut<'_>, (volume, ..): (&mut [f64], &mut [()], &mut [()])) {
+        let sum = if row.shares.is_empty() { self.sum::<V, false>(cluster, row) } else { self.sum::<V, true>(cluster, row) };
+        volume.iter_mut().zip(sum.store()).for_each(|(volume, sum)| *volume = 1.0 / sum);
+    }
+}
+
+impl<K: Kernel, const D: usize> Volumes<'_, K, D> {
+    /// Set the slopes and return Σ W. With shares (`SHARED`) take off the slopes what the cluster's particles do not see; the sum then
+    /// counts each place once, and all fluid: the volume of a particle is that of its place, whatever it sees.
+    #[inline(always)]
+    fn sum<V: Lanes, const SHARED: bool>(&self, cluster: Cluster, row: RowMut<'_>) -> V {
         let here: [V; D] = cluster.vectors(self.position);
         let (value_factor, slope_factor) = self.kernel.factors();
         let slope_factor = slope_factor * self.nominal;
         let mut sum = V::zero();
+        let mut number = 0;
         // Distances in double precision, kernels in single, eight at a time.
         let mut squares = [[0.0; LANES]; BLOCK];
         for block in row.entries.chunks_mut(BLOCK) {
@@ -265,32 +276,20 @@ impl<K: Kernel, const D: usize> VisitMut<f64, (), ()> for Volumes<'_, K, D> {
                 let (values, slopes) = Smoothing::<K>::value_and_slope(V::load_singles(squares), slope_factor);
                 let (values, slopes) = (V::split(values), V::store_singles(slopes));
                 for (k, entry) in two.iter_mut().enumerate() {
-                    sum += values[k];
                     entry.slopes = slopes[k];
+                    if SHARED {
+                        let shares = &row.shares[number];
+                        let place = if number < row.flowing { V::splat(1.0) } else { V::load_single(shares) };
+                        sum += values[k] * place;
+                        entry.slopes.iter_mut().zip(shares).for_each(|(slope, share)| *slope *= share);
+                        number += 1;
+                    } else {
+                        sum += values[k];
+                    }
                 }
             }
         }
-        let mut sum = (sum * V::splat(value_factor)).store();
-        if !row.shares.is_empty() {
-            sum = self.sum_of_shares(cluster, row);
-        }
-        volume.iter_mut().zip(sum).for_each(|(volume, sum)| *volume = 1.0 / sum);
-    }
-}
-
-impl<K: Kernel, const D: usize> Volumes<'_, K, D> {
-    /// Take off the slopes what the cluster's particles do not see, and return Σ W. That counts each place once, and all fluid: the
-    /// volume of a particle is that of its place, whatever it sees.
-    fn sum_of_shares(&self, cluster: Cluster, row: RowMut<'_>) -> [f64; LANES] {
-        let mut sum = [0.0; LANES];
-        for (k, (entry, shares)) in row.entries.iter_mut().zip(row.shares).enumerate() {
-            for (lane, i) in cluster.particles().into_iter().enumerate() {
-                let share = if k < row.flowing { 1.0 } else { f64::from(shares[lane]) };
-                sum[lane] += share * self.kernel.value((self.position[i] - self.position[entry.j()]).norm());
-                entry.slopes[lane] *= shares[lane];
-            }
-        }
-        sum
+        sum * V::splat(value_factor)
     }
 }
 
