@@ -12,7 +12,7 @@ from collections import defaultdict
 
 import alsph
 from alsph.engine import simulation
-from alsph.folder import checkpoint, run_folder, vtkhdf
+from alsph.folder import checkpoint, run_folder, surface, vtkhdf
 
 seconds, calls = defaultdict(float), defaultdict(int)
 
@@ -52,7 +52,7 @@ timed(run_folder.RunFolder, "append_history", "history")
 timed(run_folder.RunFolder, "write_checkpoint", "checkpoints")
 timed(checkpoint, "digest", "digests of the state")
 timed(vtkhdf, "append", "outputs of the particles")
-timed(run_folder.RunFolder, "append_surface", "surface pressure")
+timed(surface, "append", "surface pressure")
 timed(run_folder.RunFolder, "write_info", "run.json")
 
 resolution, until = (int(sys.argv[1]) if len(sys.argv) > 1 else 20), (float(sys.argv[2]) if len(sys.argv) > 2 else 2.0)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from alsph.cases import Cylinder
 from alsph.config import Config, RunSettings
+from alsph.folder import surface
 from alsph.folder.run_folder import RunFolder
 from alsph.results.run import Run
 
@@ -77,6 +78,11 @@ def particles(case):
     }
 
 
+def append_surface(folder: RunFolder, time, points, sample):
+    """Append a sample (m,) of C_p at points told by arrays, ``angle`` among them."""
+    folder.append("surface.h5", lambda path: surface.append(path, np.array([time]), points, np.asarray(sample)[None]))
+
+
 def write_run(path: Path, case=SHORT, *, end=60.0) -> Path:
     """Write a run folder of shedding up to tU/D = `end`, with snapshots every 10 D/U."""
     folder = RunFolder(path)
@@ -86,7 +92,7 @@ def write_run(path: Path, case=SHORT, *, end=60.0) -> Path:
     angle = np.arange(0.0, 360.0, 5.0)
     for time in np.arange(0.0, end, 0.5):
         profile = 1 - 2 * np.sin(np.radians(angle)) ** 2 + 0.1 * np.sin(SHED * time) * np.sin(np.radians(angle))
-        folder.append_surface(np.array([time]), angle, profile[None])
+        append_surface(folder, time, {"angle": angle}, profile)
     for time in np.arange(0.0, end + 1, 10.0):
         folder.append_particles(float(time), particles(case))
     return path

@@ -11,6 +11,9 @@ from alsph.config import Config, RunSettings
 from alsph.errors import RunFolderError
 from alsph.folder import vtkhdf
 from alsph.folder.run_folder import RunFolder, flatten
+from alsph.geometry.surface import circle
+from alsph.running.outputs import SurfacePressure
+from synthetic import append_surface
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
@@ -96,7 +99,7 @@ def test_file_type_is_as_paraview_expects(folder):
 
 def test_checkpoint_round_trip_to_the_last_bit(folder):
     state = {name: value for name, value in particles(9).items() if name not in ("vorticity", "velocity_divergence")}
-    state |= {"time": 1 / 3, "step": 12, "mass_in": 0.1, "next_id": 2**63 + 1}
+    state |= {"time": 1 / 3, "step": 12, "mass_in": 0.1}
     folder.write_checkpoint(state, {"case": "cylinder"})
     found = folder.read_checkpoint()
     read = found.state
@@ -122,10 +125,10 @@ def test_history_columns():
 def test_history_and_samples_are_cut_at_the_checkpoint(folder):
     for step in (1, 2, 3):
         folder.append_history({"step": np.array([step]), "time": np.array([0.1 * step])}, [])
-        folder.append_surface(np.array([0.1 * step]), np.array([0.0, 90.0]), np.array([[1.0, -step]]))
+        append_surface(folder, 0.1 * step, {"angle": np.array([0.0, 90.0])}, [1.0, -step])
     with (folder.path / "history.csv").open("a") as file:
         file.write("4,")
-    folder.truncate(step=2, time=0.2)
+    folder.truncate(2, 0.2, [SurfacePressure(circle(0.5, 72), 0.1)])
     assert (folder.path / "history.csv").read_text() == "step,time\n1,0.1\n2,0.2\n"
     with h5py.File(folder.path / "surface.h5") as file:
         assert file["time"][:] == pytest.approx([0.1, 0.2])

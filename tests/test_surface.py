@@ -11,7 +11,7 @@ from alsph.errors import ConfigError, RunFolderError
 from alsph.folder.run_folder import RunFolder
 from alsph.geometry.surface import along, circle, edges
 from shapely import affinity
-from synthetic import history, write_run
+from synthetic import append_surface, history, write_run
 
 SLOPE = np.array([0.3, -0.7])
 CAMBERED = "1 0.001\n0.7 0.09\n0.4 0.13\n0.1 0.08\n0 0\n0.1 0.01\n0.4 0.05\n0.7 0.04\n1 -0.001\n"
@@ -88,7 +88,7 @@ def write_body(path, case, coefficient, *, geometry=True, torque=0.0):
     surface = case.surface_points()
     arrays = surface.arrays() if geometry else {}
     for time in np.arange(0.0, 10.0, 0.5):
-        folder.append_surface(np.array([time]), surface.angle, coefficient(surface)[None], arrays)
+        append_surface(folder, time, {"angle": surface.angle} | arrays, coefficient(surface))
     return Run(path)
 
 
@@ -134,9 +134,9 @@ def test_folders_of_older_versions_have_no_geometry(tmp_path):
 def test_samples_at_other_points_are_set_aside(tmp_path):
     folder = RunFolder(tmp_path / "run")
     folder.create(Config(Cylinder()))
-    folder.append_surface(np.array([0.1]), np.array([0.0, 90.0]), np.zeros((1, 2)))
+    append_surface(folder, 0.1, {"angle": np.array([0.0, 90.0])}, np.zeros(2))
     with pytest.warns(RuntimeWarning, match="sampled at other points"):
-        folder.append_surface(np.array([0.2]), np.array([0.0, 80.0]), np.ones((1, 2)), {"part": np.zeros(2)})
+        append_surface(folder, 0.2, {"angle": np.array([0.0, 80.0]), "part": np.zeros(2)}, np.ones(2))
     assert (tmp_path / "run" / "surface.damaged.h5").exists()
     with h5py.File(tmp_path / "run" / "surface.h5") as file:
         assert file["time"][:].tolist() == [0.2] and "part" in file

@@ -17,6 +17,7 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.method import Method
+from alsph.engine.output import Output
 from alsph.engine.problem import Problem
 from alsph.engine.simulation import Simulation, bytes_per_particle, time_step_limits
 from alsph.errors import ConfigError
@@ -137,6 +138,10 @@ class Case(Method):
     def surface_points(self) -> Surface | None:
         """Return where the surface pressure is sampled."""
         return None
+
+    def outputs(self) -> list[Output]:
+        """Return what a run records beside particles, history and surface pressure."""
+        return []
 
     @property
     def chord(self) -> float:

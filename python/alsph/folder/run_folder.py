@@ -13,23 +13,24 @@ import re
 import shutil
 import time as clock
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
 import filelock
-import numpy as np
 from numpy.typing import NDArray
 
-from alsph.arrays import AXES, FloatArray, size_of
+from alsph.arrays import AXES, size_of
 from alsph.engine.inflow import Prescription
+from alsph.engine.output import Output
 from alsph.errors import DamagedError, RunFolderError
 from alsph.folder import checkpoint, reading, vtkhdf
 from alsph.folder.checkpoint import Checkpoint
-from alsph.folder.durable import flush, growing, replacing
-from alsph.folder.reading import DAMAGE, sound
+from alsph.folder.durable import flush, replacing
+from alsph.folder.reading import DAMAGE
 from alsph.text import printable
 
 try:
@@ -46,6 +47,7 @@ MARKS = ("case.toml", "run.json")
 OWN = re.compile(
     r"\.?(case\.toml|run\.json|run\.log|\.?lock|(checkpoint(\.previous)?|history|particles|surface|start|breakdown)(\.damaged\d*)?"
     r"\.(h5|csv|vtkhdf))(\.new|\.journal)?"
+    r"|output_\w+(\.damaged\d*)?\.\w+"
     r"|(ledger|forces|spectrum|pressure(_coefficient)?|vorticity|velocity(_divergence|_at_tu_d_\w+)?|kinetic_energy"
     r"|[uv]_at_[xy]_d_2)\.png"
 )
@@ -222,26 +224,11 @@ class RunFolder:
 
     def append_particles(self, time: float, particles: dict[str, NDArray[Any]]) -> None:
         """Append an output to ``particles.vtkhdf``."""
-        self._make_room(size_of(particles))
-        self._append("particles.vtkhdf", lambda path: vtkhdf.append(path, time, particles))
+        self.append("particles.vtkhdf", lambda path: vtkhdf.append(path, time, particles), size_of(particles))
 
-    def append_surface(
-        self,
-        time: FloatArray,
-        angle: FloatArray,
-        pressure_coefficient: FloatArray,
-        geometry: Mapping[str, FloatArray] | None = None,
-    ) -> None:
-        """Append to ``surface.h5``: samples (k, m) of C_p at times (k,) and angles (m,) [degrees].
-
-        A new file also takes the `geometry` of the points, by name (:class:`alsph.geometry.surface.Surface`).
-        """
-        self._make_room(pressure_coefficient.nbytes)
-        points = {"angle": angle} | dict(geometry or {})
-        self._append("surface.h5", lambda path: _append_surface(path, time, points, pressure_coefficient))
-
-    def _append(self, name: str, append: Callable[[Path], None]) -> None:
-        """Append to a file; one that has been damaged since it was written last is set aside, and a new one begun."""
+    def append(self, name: str, append: Callable[[Path], None], size: int = 0) -> None:
+        """Append `size` bytes to a file; one that has been damaged since is set aside, and a new one begun."""
+        self._make_room(size)
         path = self._file(name)
         with self._writing():
             if remark := _unless_damaged(path, append):
@@ -308,8 +295,8 @@ class RunFolder:
         with self._writing():
             self._file(CHECKPOINTS[0]).replace(self._file("checkpoint.damaged.h5"))
 
-    def truncate(self, step: int, time: float) -> list[str]:
-        """Drop the rows, outputs and samples later than a checkpoint, all of them before the first step.
+    def truncate(self, step: int, time: float, outputs: Iterable[Output] = ()) -> list[str]:
+        """Drop the rows, particles and `outputs` later than a checkpoint, all of them before the first step.
 
         Returns
         -------
@@ -318,14 +305,14 @@ class RunFolder:
         """
         damaged = []
         with self._writing():
-            if step == 0:
-                for name in ("history.csv", "particles.vtkhdf", "surface.h5"):
-                    self._file(name).unlink(missing_ok=True)
             parts: dict[str, Callable[[Path], None]] = {
                 "history.csv": lambda path: _truncate_history(path, step),
                 "particles.vtkhdf": lambda path: vtkhdf.truncate(path, time),
-                "surface.h5": lambda path: _truncate_surface(path, time),
             }
+            parts |= {output.file: partial(output.truncate, time=time) for output in outputs}
+            if step == 0:
+                for name in parts:
+                    self._file(name).unlink(missing_ok=True)
             for name, cut in parts.items():
                 if self._file(name).exists() and (remark := _unless_damaged(self._file(name), cut)):
                     damaged.append(remark)
@@ -379,24 +366,6 @@ def _unless_damaged(path: Path, change: Callable[[Path], None]) -> str:
     return ""
 
 
-def _append_surface(
-    path: Path, time: FloatArray, points: Mapping[str, FloatArray], pressure_coefficient: FloatArray
-) -> None:
-    with growing(path) as file:
-        count = len(points["angle"])
-        if "time" not in file:
-            for name, values in points.items():
-                file[name] = values
-            file.create_dataset("pressure_coefficient", (0, count), float, maxshape=(None, count), chunks=(64, count))
-            file.create_dataset("time", (0,), float, maxshape=(None,), chunks=(64,))
-        elif not (len(file["angle"]) == count and np.allclose(file["angle"], points["angle"])):
-            raise ValueError("it was sampled at other points, by another version of alsph")
-        samples = len(file["time"])
-        for name, values in (("pressure_coefficient", pressure_coefficient), ("time", time)):
-            file[name].resize(samples + len(values), axis=0)
-            file[name][samples:] = values
-
-
 def _truncate_history(path: Path, last: int) -> None:
     """Keep the complete rows up to a step."""
     with path.open("rb") as file, replacing(path) as new_path:
@@ -409,13 +378,6 @@ def _truncate_history(path: Path, last: int) -> None:
                 number = row.split(b",")[0] if row.count(b",") == header.count(b",") and row.endswith(b"\n") else b""
                 if number.isdigit() and int(number) <= last:
                     new.write(row)
-
-
-def _truncate_surface(path: Path, time: float) -> None:
-    with growing(path) as file:
-        keep = int(np.searchsorted(sound(file, "time")[:], time, side="right"))
-        for name in ("pressure_coefficient", "time"):
-            sound(file, name).resize(keep, axis=0)
 
 
 def flatten(rows: dict[str, NDArray[Any]], bodies: list[str]) -> dict[str, NDArray[Any]]:

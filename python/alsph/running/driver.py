@@ -17,6 +17,7 @@ from alsph.folder import checkpoint
 from alsph.folder.run_folder import RunFolder
 from alsph.running import beginning
 from alsph.running.control import Control, interruptible
+from alsph.running.outputs import outputs_of
 from alsph.running.progress import Reporter
 from alsph.running.provenance import describe, peak_memory, provenance
 from alsph.text import duration
@@ -50,11 +51,10 @@ class Driver:
         """Take a case and a simulation of it, and note from which step on."""
         self.config, self.simulation = config, simulation
         self.bodies = [body["name"] for body in simulation.problem.settings["bodies"]]
-        self.surface = config.case.surface_points()
+        self.outputs = outputs_of(config)
+        self.due = [next_multiple(simulation.time, output.interval) for output in self.outputs]
         self.next_output = next_multiple(simulation.time, config.run.output_interval)
-        self.next_surface = next_multiple(simulation.time, config.run.surface_interval)
         self.unwritten: list[dict[str, Any]] = []
-        self.samples: list[tuple[float, Any]] = []
         self.flushed = self.checkpointed = clock.monotonic()
         self._note_checkpoint(simulation.state())
         self.written = simulation.step or -1
@@ -107,7 +107,7 @@ class Driver:
         self._write_status("running")
         while self.simulation.time < self.config.until and not stop.is_set():
             began = clock.monotonic()
-            self.simulation.run_until(min(self.next_surface, self.next_output, self.config.until), SLICE_SECONDS)
+            self.simulation.run_until(min(*self.due, self.next_output, self.config.until), SLICE_SECONDS)
             reporter.update(self._record())
             self.pause = max(self.pause, clock.monotonic() - began)
             if clock.monotonic() + 2 * self.pause >= self.deadline:
@@ -125,9 +125,10 @@ class Driver:
             self.logged_backflow = True
         if len(rows["time_step"]):
             self.time_step = float(rows["time_step"][-1])
-        if time >= self.next_surface:
-            self.next_surface = next_multiple(time, self.config.run.surface_interval)
-            self._sample_surface(rows)
+        for number, output in enumerate(self.outputs):
+            if time >= self.due[number]:
+                self.due[number] = next_multiple(time, output.interval)
+                output.record(self.simulation, rows)
         if time >= min(self.next_output, self.config.until):
             self.next_output = next_multiple(time, self.config.run.output_interval)
             self._output()
@@ -136,12 +137,6 @@ class Driver:
         elif now - self.flushed >= self.config.run.flush_seconds:
             self._flush()
         return rows
-
-    def _sample_surface(self, rows: dict[str, Any]) -> None:
-        """Sample C_p = (p − p_0) / (½ρU²), with p_0 the pressure at the inlet."""
-        if self.surface:
-            pressure = self.simulation.sample(self.surface.position)["pressure"]
-            self.samples.append((self.simulation.time, 2 * (pressure - rows["inlet_pressure"][-1])))
 
     def _output(self) -> None:
         self.folder.append_particles(self.simulation.time, self.simulation.snapshot())
@@ -156,10 +151,8 @@ class Driver:
 
     def _checkpoint(self, status: str = "running") -> None:
         self._flush()
-        if self.samples and self.surface:
-            times, samples = (np.array(values) for values in zip(*self.samples, strict=True))
-            self.folder.append_surface(times, self.surface.angle, samples, self.surface.arrays())
-            self.samples = []
+        for output in self.outputs:
+            self.folder.append(output.file, output.append)
         if self.written != self.simulation.step:  # else it is there, and must not displace the one before
             state = self.simulation.state()
             self.folder.write_checkpoint(state, self.config.case_tables(), self.simulation.prescribed)
@@ -197,7 +190,7 @@ class Driver:
         config, broke_down = Config(shorter, self.config.run), self.where
         self._go_on_with(config, beginning.restored(config, saved, self.folder))
         self.rewound = True
-        self.folder.truncate(self.simulation.step, self.simulation.time)
+        self.folder.truncate(self.simulation.step, self.simulation.time, self.outputs)
         self.retries = [retry for retry in self.retries if retry["step"] <= self.simulation.step]
         self.retries.append({"step": self.simulation.step, "time_step": step, "message": message})
         self._write_status("running")

@@ -18,6 +18,7 @@ from alsph.results.run import Run
 from alsph.running import beginning
 from alsph.running.control import Control
 from alsph.running.driver import Driver
+from alsph.running.outputs import outputs_of
 
 FIXED = ("dimensions", "particle_spacing", "smoothing_ratio", "kernel", "domain", "bodies")
 """Settings of the engine that the particles were made for: they cannot change in mid-run."""
@@ -29,6 +30,7 @@ def start(config: Config, path: Path, control: Control | None = None, *, force: 
     folder.check_new(force=force, configuration=config)
     simulation = config.case.simulation(config.run.threads, config.run.initial_run)
     remarks, info = beginning.of(config)
+    driver = Driver(config, folder, simulation, {"start": info})
     with folder.claimed():
         folder.check_new(force=force, configuration=config)  # another process may have been faster
         folder.create(config, 3 * size_of(simulation.problem.state))
@@ -39,7 +41,7 @@ def start(config: Config, path: Path, control: Control | None = None, *, force: 
             folder.log(f"outline: {outline}")
         if config.run.initial_run is not None:
             folder.write_start(simulation.state(), config.case_tables())
-        Driver(config, folder, simulation, {"start": info}).run(control)
+        driver.run(control)
     return Run(path)
 
 
@@ -140,7 +142,7 @@ def _resume(folder: RunFolder, until: float | None, threads: int | None, control
         remarks += beginning.changed(config, info)
         if saved.warning:
             folder.set_damaged_aside()
-        remarks += folder.truncate(simulation.step, simulation.time)
+        remarks += folder.truncate(simulation.step, simulation.time, outputs_of(config))
         folder.write_config(config)
         for remark in remarks:
             folder.log(f"warning: {remark}")
