@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from alsph import repeat, resume
 from alsph.cases import Body
 from alsph.errors import ConfigError
 from alsph.geometry.outline import Outline
@@ -215,7 +216,7 @@ def test_no_folder_device_pipe_or_giant_is_read(tmp_path):
     for path in ("", "no\0file", 300 * "a", "missing"):
         with pytest.raises(ConfigError, match="neither|a folder"):
             Body(shape=path)
-    with pytest.raises(ConfigError, match="must be a name, a file, or an outline"):
+    with pytest.raises(ConfigError, match="must be points"):
         Body(shape=5)
     (tmp_path / "long").write_text("0 0\n" + 2**19 * "1" + "!! 1\n")
     with pytest.raises(ConfigError, match="long:2: a line of"):
@@ -331,3 +332,40 @@ def test_open_curves_that_may_be_one_body_or_two_are_refused(tmp_path):
         Outline.read(path)
     path.write_text("0 0\n1 0\n1 1\n0 1\n0 0\n\n-.3 0\n-1.3 0\n-1.3 1\n-.3 1\n-.3 0\n")
     assert len(Outline.read(path).polygons) == 2
+
+
+ELLIPSE = np.stack([0.5 * np.cos(np.arange(60) * np.pi / 30), 0.25 * np.sin(np.arange(60) * np.pi / 30)], axis=1)
+
+
+def test_shapes_made_in_python_are_bodies_that_run_resume_and_repeat(tmp_path):
+    case = Body(shape=ELLIPSE, resolution=8, length=5.0, height=4.0, upstream=2.0)
+    assert case == case.replace(shape=shapely.Polygon(ELLIPSE)) == case.replace(shape=[ELLIPSE.tolist()])
+    run = case.run(tmp_path / "run", until=0.05, threads=1, progress=False)
+    assert run.config.case == case
+    assert run.config.case.outline.area == pytest.approx(shapely.Polygon(ELLIPSE).area)
+    assert resume(run.path, until=0.1, progress=False).status == "finished"
+    assert repeat(run.path).same
+    pair = Body(shape=shapely.MultiPolygon([shapely.Polygon(ELLIPSE), shapely.Polygon(ELLIPSE + [0, 1])]))
+    assert [body["name"] for body in pair.bodies()] == ["body_1", "body_2"]
+
+
+@pytest.mark.parametrize(
+    ("shape", "problem"),
+    [
+        (3, "must be points (n, 2) of a closed curve"),
+        ([], "must be points (n, 2) of a closed curve"),
+        (np.zeros((3, 3)), "must be points (n, 2) of a closed curve"),
+        ([["a", "b"], ["c", "d"]], "must be points (n, 2) of a closed curve"),
+        (ELLIPSE[:2], 'points:1: "0.5 0.0": begins a curve of too few points'),
+        (ELLIPSE * [1, np.nan], "coordinates must be finite"),
+        (np.zeros((20_001, 2)), "has more than 20000 points"),
+        ([ELLIPSE, ELLIPSE], "body 1 lies within body 2"),
+        ([[0, 0], [1, 1], [1, 0], [0, 1]], "the curve meets itself"),
+        (shapely.Point(0, 0), "must be of polygons without holes, not Point"),
+        (shapely.Polygon(ELLIPSE, [ELLIPSE / 2]), "must be of polygons without holes"),
+    ],
+)
+def test_what_is_no_shape_is_refused(shape, problem):
+    with pytest.raises(ConfigError) as error:
+        Body(shape=shape)
+    assert problem in str(error.value)

@@ -43,7 +43,8 @@ class Body(Channel):
 
     shape: str | Outline = Field(
         default="square_cylinder",
-        description="square_cylinder, naca0012, or a text file of points: one or several closed curves, lengths in D",
+        description="square_cylinder, naca0012, or a text file of points: one or several closed curves, lengths in D; "
+        "in Python also arrays of points or shapely's polygons",
     )
     angle_of_attack: float = Field(default=0.0, ge=-180, le=180, description="angle of attack, nose up [degrees]")
 
@@ -58,9 +59,7 @@ class Body(Channel):
             if not os.path.exists(shape):
                 raise ValueError(f"neither {' nor '.join(SHAPES)} nor a file that is there")
             return Outline.read(shape)
-        if isinstance(shape, Outline):
-            return shape
-        raise ValueError("must be a name, a file, or an outline as run folders hold it")
+        return shape if isinstance(shape, Outline) else Outline.of(shape)
 
     @model_validator(mode="after")
     def _fits_in(self) -> Self:

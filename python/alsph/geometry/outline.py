@@ -11,15 +11,16 @@ import math
 import os
 import re
 import stat
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import accumulate, chain, pairwise
 from pathlib import Path
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
 from alsph.errors import ConfigError
@@ -89,6 +90,8 @@ class Part:
 class Outline(Parameters):
     """The closed curves of one body or of several. A run folder holds them, and so needs no file beside it."""
 
+    FORMS: ClassVar[str] = "must be points (n, 2) of a closed curve, a list of such arrays, or shapely's polygons"
+
     file: str = Field(description="name of the file that they were read from")
     sha256: str = Field(description="SHA-256 of the points as they are written here")
     points: str = Field(description="a point a line, x and y [D], and a blank line between two bodies")
@@ -104,9 +107,49 @@ class Outline(Parameters):
             If it holds no outline; the message names file and line.
         """
         name = _shown(os.path.basename(path))
-        bodies, remarks = zip(*(_closed(curve, name) for curve in _curves(_text(path), name)), strict=True)
-        curves = [shapely.get_coordinates(body.exterior)[:-1].tolist() for body in bodies]
-        points = "\n".join("".join(f"{x!r} {y!r}\n" for x, y in curve) for curve in curves)
+        return cls._around(_curves(_text(path), name), name)
+
+    @classmethod
+    def of(cls, shape: ArrayLike | Sequence[ArrayLike] | shapely.Geometry) -> Self:
+        """Return the outline of a shape made in Python.
+
+        Parameters
+        ----------
+        shape
+            The points (n, 2) of a closed curve [D], a list of such arrays, or a polygon or multipolygon of shapely.
+
+        Raises
+        ------
+        ConfigError
+            If it is no outline; the message names the point.
+        """
+        if isinstance(shape, shapely.Geometry):
+            polygons = list(shapely.get_parts(shape))
+            if not all(isinstance(polygon, shapely.Polygon) and not polygon.interiors for polygon in polygons):
+                raise ConfigError(f"must be of polygons without holes, not {shape.geom_type}")
+            shape = [shapely.get_coordinates(polygon.exterior)[:-1] for polygon in polygons]
+        try:
+            one = np.ndim(shape[0]) == 1 and len(shape[0]) == 2  # type: ignore[index, arg-type]
+            curves = [np.asarray(curve, float) for curve in ([shape] if one else shape)]  # type: ignore[union-attr]
+        except (TypeError, ValueError, IndexError):
+            raise ConfigError(cls.FORMS) from None
+        if not curves or any(curve.ndim != 2 or curve.shape[1] != 2 or not len(curve) for curve in curves):
+            raise ConfigError(cls.FORMS)
+        if not all((np.abs(curve) <= LARGEST_NUMBER).all() for curve in curves):
+            raise ConfigError(f"coordinates must be finite and at most {LARGEST_NUMBER:g} D")
+        if sum(map(len, curves)) > MOST_POINTS:
+            raise ConfigError(f"has more than {MOST_POINTS} points")
+        lines = (
+            [Line(number, f"{x!r} {y!r}", (x, y)) for number, (x, y) in enumerate(curve.tolist(), 1)]
+            for curve in curves
+        )
+        return cls._around(lines, "points")
+
+    @classmethod
+    def _around(cls, curves: Iterable[list[Line]], name: str) -> Self:
+        bodies, remarks = zip(*(_closed(curve, name) for curve in curves), strict=True)
+        all_corners = [shapely.get_coordinates(body.exterior)[:-1].tolist() for body in bodies]
+        points = "\n".join("".join(f"{x!r} {y!r}\n" for x, y in corners) for corners in all_corners)
         return cls(file=name, sha256=_sha256(points), points=points, remark="; ".join(filter(None, remarks)))
 
     @model_validator(mode="after")
