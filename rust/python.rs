@@ -2,6 +2,7 @@
 
 use crate::base::lanes::{Instructions, LANES};
 use crate::base::{Error, Matrix, Vector};
+use crate::kernel::KernelKind;
 use crate::loads::Load;
 use crate::neighbours::Entry;
 use crate::particles::{ParticleKind, Particles, each_array};
@@ -212,6 +213,17 @@ fn bytes_per_particle(settings: &str) -> PyResult<f64> {
     Ok(1.5 * neighbours * (size_of::<Entry>() / LANES) as f64 + fields as f64 + 100.0)
 }
 
+/// The kernels by name, each with its support radius over the smoothing length.
+#[pyfunction]
+fn kernels(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let dict = PyDict::new(py);
+    for kind in KernelKind::ALL {
+        let name = serde_json::to_value(kind).map_err(|error| ConfigError::new_err(error.to_string()))?;
+        dict.set_item(name.as_str(), kind.support())?;
+    }
+    Ok(dict)
+}
+
 /// Name of the vector instructions in use, ``portable`` or ``avx2``; the environment variable ``ALSPH_INSTRUCTIONS`` pins them.
 #[pyfunction]
 fn instructions() -> PyResult<&'static str> {
@@ -226,6 +238,7 @@ fn _alsph(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PySimulation>()?;
     module.add_function(wrap_pyfunction!(time_step_limits, module)?)?;
     module.add_function(wrap_pyfunction!(bytes_per_particle, module)?)?;
+    module.add_function(wrap_pyfunction!(kernels, module)?)?;
     module.add_function(wrap_pyfunction!(instructions, module)?)
 }
 

@@ -1,5 +1,6 @@
 //! Whole steps: exact solutions, symmetry, conservation, and the same bits on any number of threads.
 
+use alsph::settings::{DensityDiffusion, SchemeSettings};
 use alsph::{Clock, ParticleKind, Particles, Settings, Simulation, Vector};
 use approx::assert_relative_eq;
 use serde_json::{Value, json};
@@ -329,8 +330,13 @@ fn tank(wall_pressure: &str) -> (Settings, Particles<2>) {
 
 #[test]
 fn hydrostatic_pressure_builds_up_and_weighs_on_the_walls() {
-    for rule in ["paper", "adami", "linear"] {
-        let (settings, particles) = tank(rule);
+    let alsph = SchemeSettings::Alsph;
+    let (sound_speed, density_diffusion) = (10.0, DensityDiffusion::Antuono);
+    let wcsph = SchemeSettings::Wcsph { sound_speed, density_diffusion, diffusion_coefficient: 0.1 };
+    let edac = SchemeSettings::Edac { sound_speed, diffusion_coefficient: 0.5 };
+    for (scheme, rule) in [(alsph, "paper"), (alsph, "adami"), (alsph, "linear"), (wcsph, "linear"), (edac, "linear")] {
+        let (mut settings, particles) = tank(rule);
+        settings.scheme = scheme;
         let mut simulation = Simulation::new(settings, particles, Clock::default(), Some(2)).expect("valid");
         simulation.advance_until(4.0, None).expect("stable");
         let particles = simulation.particles();

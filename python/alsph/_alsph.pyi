@@ -73,6 +73,9 @@ class Simulation:
 def time_step_limits(settings: str, velocity_max: float) -> dict[str, float]:
     """Largest Δt: ``courant``, ``penalty``, ``viscous``, ``body_force`` (or inf), and ``lambda_max``: λ_max Δx²."""
 
+def kernels() -> dict[str, float]:
+    """Return the kernels by name, each with its support radius over the smoothing length."""
+
 def instructions() -> str:
     """Name of the vector instructions in use, ``portable`` or ``avx2``; ``ALSPH_INSTRUCTIONS`` pins them."""
 

@@ -1,6 +1,6 @@
 //! Smoothing kernels W(r, h), normalised in 1-D to 3-D.
 //!
-//! A new kernel is one file and one name in each of the four lists below.
+//! A new kernel is one file, and here its module, its type and its name in the list of `kernels!`; Python asks for that list.
 
 use crate::base::lanes::Real;
 use serde::{Deserialize, Serialize};
@@ -23,34 +23,34 @@ pub trait Kernel: Copy + Send + Sync {
     fn derivative<R: Real>(q: R) -> R;
 }
 
-/// The choice of kernel as a setting.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum KernelKind {
-    QuinticSpline,
-    WendlandC2,
-    WendlandC4,
-}
+/// The choice of kernel as a setting, by the types in `$kernel`, and `with_kernel!(kind, K => body)`, which runs `body` with the type `K`
+/// bound to the kernel chosen at run time. `$d` is a dollar.
+macro_rules! kernels {
+    ($d:tt $($kernel:ident)*) => {
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        pub enum KernelKind {
+            $($kernel,)*
+        }
 
-/// Run `$body` with the type `$K` bound to the kernel chosen at run time.
-macro_rules! with_kernel {
-    ($kind:expr, $K:ident => $body:expr) => {
-        match $kind {
-            $crate::kernel::KernelKind::QuinticSpline => {
-                type $K = $crate::kernel::QuinticSpline;
-                $body
-            }
-            $crate::kernel::KernelKind::WendlandC2 => {
-                type $K = $crate::kernel::WendlandC2;
-                $body
-            }
-            $crate::kernel::KernelKind::WendlandC4 => {
-                type $K = $crate::kernel::WendlandC4;
-                $body
-            }
+        impl KernelKind {
+            pub const ALL: &[Self] = &[$(Self::$kernel,)*];
+        }
+
+        macro_rules! with_kernel {
+            ($d kind:expr, $d K:ident => $d body:expr) => {
+                match $d kind {
+                    $($crate::kernel::KernelKind::$kernel => {
+                        type $d K = $crate::kernel::$kernel;
+                        $d body
+                    })*
+                }
+            };
         }
     };
 }
+
+kernels!($ QuinticSpline WendlandC2 WendlandC4);
 
 pub(crate) use with_kernel;
 
@@ -94,8 +94,8 @@ mod tests {
 
     #[test]
     fn kernels_integrate_to_one_and_match_their_derivative() {
-        check::<QuinticSpline>(1);
-        check::<WendlandC2>(2);
-        check::<WendlandC4>(2);
+        for kind in KernelKind::ALL {
+            with_kernel!(kind, K => check::<K>(if K::SUPPORT == 2.0 { 2 } else { 1 }));
+        }
     }
 }

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from alsph.engine.simulation import kernels
 from alsph.parameters import Parameters
 
-SUPPORT = {"quintic_spline": 3, "wendland_c2": 2, "wendland_c4": 2}
+SUPPORT = kernels()
 """Support radius of each kernel in smoothing lengths."""
+
+SUPPORTS = ", ".join(f"{support:g}h" for support in SUPPORT.values())
+
+if TYPE_CHECKING:
+    Kernel = str
+else:
+    Kernel = Literal[tuple(SUPPORT)]
 
 COURANT = 0.3
 """Courant number where neither it nor the paper's pair is given."""
@@ -120,9 +128,7 @@ class Method(Parameters):
     smoothing_ratio: float = Field(
         default=4 / 3, ge=1, le=2, description="smoothing length over particle spacing, h/Δx [-]"
     )
-    kernel: Literal["quintic_spline", "wendland_c2", "wendland_c4"] = Field(
-        default="quintic_spline", description="smoothing kernel; support 3h, 2h, 2h"
-    )
+    kernel: Kernel = Field(default="quintic_spline", description=f"smoothing kernel; support {SUPPORTS}")
     velocity_laplacian: Literal["scalar", "vector"] = Field(
         default="scalar", description="viscous term per component, or eq. (16) as printed"
     )

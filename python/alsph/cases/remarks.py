@@ -102,7 +102,7 @@ def validated(reynolds: float, resolution: int, cell_reynolds: float, known: tup
 
 def kernel(name: str, smoothing_ratio: float) -> list[str]:
     """Remark on a kernel whose support is too narrow for the particles in it."""
-    if smoothing_ratio >= NARROWEST[name] - 1e-9:
+    if smoothing_ratio >= NARROWEST.get(name, 0.0) - 1e-9:
         return []
     found = (
         "Taylor-Green vortices broke down with h/Δx = 1.1; use smoothing_ratio = 1.2 or more"

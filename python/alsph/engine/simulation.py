@@ -45,6 +45,11 @@ def time_step_limits(settings: dict[str, Any], velocity_max: float) -> dict[str,
         return _alsph.time_step_limits(json.dumps(settings), velocity_max)
 
 
+def kernels() -> dict[str, float]:
+    """Return the kernels by name, each with its support radius over the smoothing length."""
+    return _alsph.kernels()
+
+
 TYPES: dict[str, tuple[type[np.generic], int]] = {
     "position": (np.float64, 2),
     "velocity": (np.float64, 2),
