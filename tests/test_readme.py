@@ -2,7 +2,8 @@ import re
 import tomllib
 from pathlib import Path
 
-from alsph import config
+import pytest
+from alsph import cases, config
 
 README = Path(__file__).parent.parent / "README.md"
 SMALL_SCALE = {
@@ -30,6 +31,36 @@ def test_the_configuration_file_is_valid():
     assert config.from_tables(tomllib.loads(example)).until == 60
 
 
-def test_links_lead_somewhere():
-    links = re.findall(r"\]\(([^)#:]+)\)", README.read_text(encoding="utf-8"))
-    assert links and [link for link in links if not (README.parent / link).exists()] == []
+ADD_YOUR_OWN = README.parent / "docs" / "add_your_own.md"
+
+
+def test_the_examples_of_adding_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(cases, "CASES", dict(cases.CASES))
+    monkeypatch.chdir(tmp_path)
+    for example in re.findall(r"```python\n(.*?)```", ADD_YOUR_OWN.read_text(encoding="utf-8"), re.DOTALL):
+        example = example.replace("resolution=20).run", "resolution=8).run").replace("until=0.5", "until=0.2")
+        exec(compile(example, str(ADD_YOUR_OWN), "exec"), {"__name__": "add_your_own"})
+    out = capsys.readouterr().out
+    assert "share of the energy that is lost" in out
+
+
+@pytest.mark.parametrize("page", [README, ADD_YOUR_OWN], ids=lambda page: page.stem)
+def test_links_lead_somewhere(page):
+    text = page.read_text(encoding="utf-8")
+    links = re.findall(r"\]\(([^)#:]+)\)", text)
+    assert [link for link in links if not (page.parent / link).exists()] == []
+    headings = {
+        re.sub(r"[^\w -]", "", line.lstrip("# ").lower()).replace(" ", "-")
+        for line in text.splitlines()
+        if line[:1] == "#"
+    }
+    assert set(re.findall(r"\]\(#([^)]+)\)", text)) <= headings
+
+
+def test_the_files_that_adding_touches_are_there():
+    words = re.findall(
+        r"`((?:rust|tests|cases|running|engine|folder)/[\w/.]+)`", ADD_YOUR_OWN.read_text(encoding="utf-8")
+    )
+    roots = (README.parent, README.parent / "python" / "alsph")
+    missing = [word for word in words if "/x." not in word and not any((root / word).exists() for root in roots)]
+    assert words and missing == []

@@ -8,4 +8,4 @@ mod solid;
 pub use condition::{Condition, PressureRule, VelocityRule, conditions};
 pub use open::{MassFlow, end_step};
 pub use profile::surface_area;
-pub use solid::{Walls, extrapolate, extrapolate_pressure};
+pub use solid::{Walls, extrapolate_pressure, extrapolate_scalar, extrapolate_vector};

@@ -5,6 +5,7 @@ use crate::base::parallel;
 use crate::boundary::profile::profiles;
 use crate::discretisation::Stencil;
 use crate::frame::Frame;
+use crate::halo::{Mirrored, Poison};
 use crate::kernel::{Smoothing, with_kernel};
 use crate::neighbours::Entry;
 use crate::particles::{ParticleKind, Particles};
@@ -148,25 +149,41 @@ fn shepard<const D: usize, const N: usize>(
     (total > 0.0).then(|| sum.map(|s| s / total))
 }
 
-/// Give each solid particle of `field` the Shepard average of what `at(field, j, r_ij)` says of the flowing neighbours; zero
-/// without neighbours. `kind` is that of the real particles. Images are renewed before and after.
-pub fn extrapolate<const D: usize>(
+/// Give each solid particle of `field` the Shepard average of what `at(field, j, r_ij)` says of the flowing neighbours, as `of` makes it
+/// of N numbers; of zeros without neighbours. `kind` is that of the real particles. Images are renewed before and after.
+fn extrapolate<T: Mirrored<D> + Poison, const D: usize, const N: usize>(
     settings: &Settings,
     frame: &Frame<D>,
     kind: &[ParticleKind],
-    field: &mut [f64],
-    at: impl Fn(&[f64], usize, Vector<D>) -> f64 + Sync,
+    field: &mut [T],
+    at: impl Fn(&[T], usize, Vector<D>) -> [f64; N] + Sync,
+    of: impl Fn([f64; N]) -> T + Sync,
 ) {
     frame.images.fill(field);
     let values = &*field;
-    let average = |i| shepard(settings, &frame.stencil, i, |j, r_ij| [at(values, j, r_ij)]).map_or(0.0, |[average]| average);
+    let average = |i| of(shepard(settings, &frame.stencil, i, |j, r_ij| at(values, j, r_ij)).unwrap_or([0.0; N]));
     let solids = (0..kind.len()).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
-    let extrapolated: Vec<(usize, f64)> = solids.map(|i| (i, average(i))).collect();
+    let extrapolated: Vec<(usize, T)> = solids.map(|i| (i, average(i))).collect();
     if !extrapolated.is_empty() {
         let real = frame.images.real(field);
         extrapolated.into_iter().for_each(|(i, value)| real[i] = value);
         frame.images.fill(field);
     }
+}
+
+/// Solid particles show the mean of what the fluid around them has: ∂/∂n = 0.
+pub fn extrapolate_scalar<const D: usize>(settings: &Settings, frame: &Frame<D>, kind: &[ParticleKind], field: &mut [f64]) {
+    extrapolate(settings, frame, kind, field, |field, j, _| [field[j]], |[mean]| mean);
+}
+
+/// [`extrapolate_scalar`] of a vector.
+pub fn extrapolate_vector<const D: usize>(
+    settings: &Settings,
+    frame: &Frame<D>,
+    kind: &[ParticleKind],
+    field: &mut [Vector<D>],
+) {
+    extrapolate(settings, frame, kind, field, |field, j, _| field[j].into(), Vector::<D>::from);
 }
 
 /// The pressure of solid particles: the Shepard average of the fluid's, with the hydrostatic term (Adami, Hu and Adams 2012, eq. 27; bodies
@@ -179,8 +196,8 @@ pub fn extrapolate_pressure<const D: usize>(
 ) {
     let hydrostatic = Vector::<D>::from_column_slice(&settings.body_force) * settings.density;
     let slope = |j: usize| if settings.wall_pressure == WallPressure::Linear { gradient[j] } else { hydrostatic };
-    let continued = |pressure: &[f64], j: usize, r_ij: Vector<D>| pressure[j] + slope(j).dot(&r_ij);
-    extrapolate(settings, frame, &kind[..*real], pressure, continued);
+    let continued = |pressure: &[f64], j: usize, r_ij: Vector<D>| [pressure[j] + slope(j).dot(&r_ij)];
+    extrapolate(settings, frame, &kind[..*real], pressure, continued, |[pressure]| pressure);
 }
 
 /// `f(j, W_ij, r_ij)` for those of the neighbours `near` of particle `i`, each with how much is seen of it, a factor of W, that are in its

@@ -19,7 +19,7 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
-use crate::boundary::{PressureRule, VelocityRule, conditions, extrapolate};
+use crate::boundary::{PressureRule, VelocityRule, conditions, extrapolate_scalar};
 use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian};
 use crate::flow::{Flow, Step};
 use crate::particles::Particles;
@@ -107,7 +107,7 @@ impl Projection {
                     PressureRule::Solved | PressureRule::FromFluid => value - derived[i].solenoidal,
                 };
             });
-            extrapolate(settings, frame, kind, divergence, |divergence, j, _| divergence[j]);
+            extrapolate_scalar(settings, frame, kind, divergence);
             let (corrected, pressure) = (frame.images.real(velocity), frame.images.real(pressure));
             let is_solved = |i: usize| condition(kind[i], &position[i]).velocity == VelocityRule::Solved;
             let correct = |i: usize, gradient: Vector<D>, u: &mut Vector<D>, p: &mut f64| {

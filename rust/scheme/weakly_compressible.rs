@@ -12,7 +12,7 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
-use crate::boundary::{PressureRule, VelocityRule, conditions, extrapolate_pressure};
+use crate::boundary::{PressureRule, VelocityRule, conditions, extrapolate_pressure, extrapolate_vector};
 use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient};
 use crate::flow::{Flow, Step};
 use crate::particles::{ParticleKind, Particles};
@@ -136,7 +136,8 @@ impl<const D: usize> WeaklyCompressible<D> {
             return;
         }
         if self.density_diffusion == DensityDiffusion::Antuono {
-            frame.images.fill(&mut self.gradient);
+            // The gradients of solids would feel where these end.
+            extrapolate_vector(step.settings, frame, &particles.kind[..particles.real], &mut self.gradient);
             let gradient = &self.gradient;
             frame.stencil.for_each_one(Divergence(gradient), &mut self.diffusing, |_, value, out| *out -= value);
         }

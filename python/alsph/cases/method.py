@@ -39,13 +39,17 @@ def _as_in_the_paper(values: Mapping[str, Any]) -> bool:
 def superseded(changes: Mapping[str, Any]) -> tuple[str, ...]:
     """Names of the parameters whose place others take.
 
-    A Courant number takes that of the paper's pair, which takes its; the coefficient of a shifting goes with its kind.
+    A Courant number takes that of the paper's pair, which takes its; the coefficient of a shifting goes with its kind,
+    the rule of the walls' pressure with the scheme.
     """
-    other = any(changes.get(name) is not None for name in ("shifting", "dimensions"))
-    coefficient = ("shift_coefficient",) if other else ()
+    others: tuple[str, ...] = ()
+    if any(changes.get(name) is not None for name in ("shifting", "dimensions")):
+        others += ("shift_coefficient",)
+    if changes.get("scheme") is not None:
+        others += ("wall_pressure",)
     if changes.get("courant") is not None:
-        return (*PAPER, *coefficient)
-    return ("courant", *coefficient) if _as_in_the_paper(changes) else coefficient
+        return (*PAPER, *others)
+    return ("courant", *others) if _as_in_the_paper(changes) else others
 
 
 DIFFUSION = {"wcsph": 0.1, "edac": 0.5}
@@ -164,7 +168,8 @@ class Method(Parameters):
     )
     wall_pressure: Literal["paper", "adami", "linear"] = Field(
         default="linear",
-        description="pressure of solid particles: eqs. (10) and (20), or that of the fluid around, constant or linear",
+        description="pressure of solid particles: eqs. (10) and (20), or that of the fluid around, constant or linear; "
+        "adami if not given with wcsph and edac, whose sound grows where it is linear",
     )
 
     @model_validator(mode="before")
@@ -174,6 +179,8 @@ class Method(Parameters):
             strain = 0.25 if values.get("dimensions") == 3 else 0.75  # in 3-D more neighbours push
             kind = values.get("shifting")
             values = values | {"shift_coefficient": strain if kind in (None, "strain") else 0.04}
+        if values.get("wall_pressure") is None:
+            values = values | {"wall_pressure": "adami" if values.get("scheme") in tuple(DIFFUSION) else "linear"}
         if values.get("courant") is not None:
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")
