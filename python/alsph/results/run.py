@@ -346,7 +346,8 @@ class Run:
             results["shedding periods"] = self.window.periods
         results["mean velocity divergence, |∇·u| D/U"] = self.divergence.mean
         results["largest velocity divergence, |∇·u| D/U"] = self.divergence.max
-        results["artificial Mach number of the penalty"] = Estimate(mach_number(self.history))
+        waves = "" if self.config.case.is_weakly_compressible else " of the penalty"
+        results[f"artificial Mach number{waves}"] = Estimate(mach_number(self.history))
         for measure in self.measures:
             value = measure.value
             results[measure.name] = value if isinstance(value, Estimate) else Estimate(value)
