@@ -48,6 +48,14 @@ def test_what_is_not_the_schemes_is_refused(chosen, message):
         Cylinder(**chosen)
 
 
+def test_the_walls_pressure_goes_with_the_scheme():
+    own = {"alsph": "linear", "wcsph": "adami", "edac": "adami"}
+    assert {name: Cylinder(scheme=name).wall_pressure for name in own} == own
+    assert {name: Cylinder().replace(scheme=name).wall_pressure for name in own} == own
+    assert Cylinder(scheme="edac").replace(scheme="alsph").wall_pressure == Cylinder().wall_pressure == "linear"
+    assert Cylinder(scheme="edac", wall_pressure="linear").replace(resolution=8).wall_pressure == "linear"
+
+
 def test_the_step_follows_the_sound_and_is_described():
     slow, fast = (Cylinder(scheme="wcsph", sound_speed=speed, resolution=10) for speed in (10, 21))
     assert slow.expected_time_step() == pytest.approx(slow.time_step_limits()["acoustic"])
@@ -57,6 +65,8 @@ def test_the_step_follows_the_sound_and_is_described():
     lines = dict(describe(Config(slow), probe=False))
     assert "artificial Mach number" in lines["speed of sound"] and lines["acoustic limit"].endswith("(binds)")
     assert any(remark.startswith("other scheme: wcsph") for remark in slow.remarks())
+    assert not any("growing sound" in remark for remark in slow.remarks())
+    assert any("growing sound" in remark for remark in slow.replace(wall_pressure="linear").remarks())
     with pytest.raises(ConfigError, match="scheme = wcsph: only steps and iterations of alsph can be tuned"):
         alsph.autotune(slow)
 

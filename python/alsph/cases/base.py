@@ -191,7 +191,7 @@ class Case(Method):
             *remarks.boundary_layer(self.boundary_layer, self.particle_spacing),
             *(remarks.validated(self.reynolds, self.resolution, self.cell_reynolds, known) if known else []),
             *remarks.kernel(self.kernel, self.smoothing_ratio),
-            *remarks.scheme(self.scheme),
+            *remarks.scheme(self.scheme, self.wall_pressure),
             *remarks.penalty(self.expected_penalty_constant()),
         ]
 

@@ -113,11 +113,17 @@ def kernel(name: str, smoothing_ratio: float) -> list[str]:
     return [f"kernel: {name} with h/Δx = {smoothing_ratio:.3g}; {found}"]
 
 
-def scheme(name: str | None) -> list[str]:
-    """Remark on a scheme with which hardly anything has been compared."""
+def scheme(name: str | None, wall_pressure: str) -> list[str]:
+    """Remark on a scheme with which hardly anything has been compared, and on walls at which its sound grows."""
     if name in (None, "alsph"):
         return []
-    return [f"other scheme: {name} has been compared with references in few flows, see docs/results.md, Other schemes"]
+    compared = (
+        f"other scheme: {name} has been compared with references in few flows, see docs/results.md, Other schemes"
+    )
+    if wall_pressure != "linear":
+        return [compared]
+    grows = "growing sound: with wall_pressure = linear sound grew at solid walls until a fluid at rest broke down"
+    return [compared, f"{grows}; use wall_pressure = adami"]
 
 
 def penalty(constant: float) -> list[str]:
