@@ -53,6 +53,42 @@ def test_an_arrow_up_is_noticed():
     assert used("use crate::scheme::Alsph;\n/// [`crate::report`]\n#[cfg(test)]\nuse crate::kernel;") == {"scheme"}
 
 
+def defined(folder: Path) -> dict[str, Path]:
+    """Return the files of a folder of the crate by the names that its ``mod.rs`` hands on, and by their own."""
+    files = {path.stem: path for path in folder.glob("*.rs") if path.stem != "mod"}
+    for module, names in re.findall(
+        r"^pub(?:\(crate\))? use (\w+)::\{?([^;}]*)\}?;", (folder / "mod.rs").read_text(), re.M
+    ):
+        files |= {name: files[module] for name in re.findall(r"\w+", names) if module in files}
+    return files
+
+
+def test_no_files_of_a_folder_of_the_engine_use_each_other():
+    circles = []
+    for folder in {path.parent for path in RUST.rglob("mod.rs")}:
+        files, name = defined(folder), ".".join(folder.relative_to(RUST).parts)
+        graph = {}
+        for path in set(files.values()):
+            code = re.sub(r"//.*", "", path.read_text().split("#[cfg(test)]")[0])
+            within = re.findall(
+                rf"\bcrate::{name.replace('.', '::')}::(\w+|{{[^}}]*}})|\bsuper::(\w+|{{[^}}]*}})", code
+            )
+            words = {word for pair in within for word in re.findall(r"\w+", "".join(pair))}
+            graph[path.stem] = {files[word].stem for word in words if word in files} - {path.stem}
+        try:
+            graphlib.TopologicalSorter(graph).prepare()
+        except graphlib.CycleError as error:
+            circles.append(error.args[1])
+    assert not circles
+
+
+def test_a_circle_in_a_folder_is_noticed():
+    files = defined(RUST / "boundary")
+    assert (
+        files["Walls"] == files["solid"] == RUST / "boundary" / "solid.rs" and files["surface_area"].stem == "profile"
+    )
+
+
 PYTHON = Path(__file__).parents[1] / "python" / "alsph"
 
 PYTHON_FLOORS = (

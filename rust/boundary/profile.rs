@@ -7,7 +7,7 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
-use crate::boundary::solid::for_each_weighted;
+use crate::boundary::average::for_each_weighted;
 use crate::discretisation::Stencil;
 use crate::kernel::{Smoothing, with_kernel};
 use crate::particles::{ParticleKind, Particles};

@@ -1,15 +1,12 @@
-//! Solid walls: what velocity and pressure a solid particle shows to the fluid. (20)
+//! Solid walls: what velocity a solid particle shows to the fluid.
 
 use crate::base::Vector;
 use crate::base::parallel;
+use crate::boundary::average::shepard;
 use crate::boundary::profile::profiles;
-use crate::discretisation::Stencil;
 use crate::frame::Frame;
-use crate::halo::{Mirrored, Poison};
-use crate::kernel::{Smoothing, with_kernel};
-use crate::neighbours::Entry;
 use crate::particles::{ParticleKind, Particles};
-use crate::settings::{Settings, WallPressure, WallVelocity};
+use crate::settings::{Settings, WallVelocity};
 use rayon::prelude::*;
 
 /// Largest ratio of the distances of solid and fluid from the surface: β_max − 1 of Morris, Fox and Zhu (1997).
@@ -126,97 +123,4 @@ impl<const D: usize> Walls<D> {
 /// Zero without a profile.
 fn value_at<const D: usize, const K: usize>(profile: Option<[Vector<D>; K]>, basis: [f64; K]) -> Vector<D> {
     profile.map_or_else(Vector::zeros, |profile| (0..K).map(|k| profile[k] * basis[k]).sum())
-}
-
-/// Σ W field_j / Σ W over the flowing neighbours of particle `i`, of the value that `at` gives for j and r_ij. None without
-/// neighbours.
-fn shepard<const D: usize, const N: usize>(
-    settings: &Settings,
-    stencil: &Stencil<D>,
-    i: usize,
-    at: impl Fn(usize, Vector<D>) -> [f64; N],
-) -> Option<[f64; N]> {
-    let mut total = 0.0;
-    let mut sum = [0.0; N];
-    let (row, lane) = stencil.neighbours.row(i);
-    for_each_weighted(settings, stencil, i, row.flowing_seen(lane), |j, weight, r_ij| {
-        let value = at(j, r_ij);
-        total += weight;
-        for k in 0..N {
-            sum[k] += weight * value[k];
-        }
-    });
-    (total > 0.0).then(|| sum.map(|s| s / total))
-}
-
-/// Give each solid particle of `field` the Shepard average of what `at(field, j, r_ij)` says of the flowing neighbours, as `of` makes it
-/// of N numbers; of zeros without neighbours. `kind` is that of the real particles. Images are renewed before and after.
-fn extrapolate<T: Mirrored<D> + Poison, const D: usize, const N: usize>(
-    settings: &Settings,
-    frame: &Frame<D>,
-    kind: &[ParticleKind],
-    field: &mut [T],
-    at: impl Fn(&[T], usize, Vector<D>) -> [f64; N] + Sync,
-    of: impl Fn([f64; N]) -> T + Sync,
-) {
-    frame.images.fill(field);
-    let values = &*field;
-    let average = |i| of(shepard(settings, &frame.stencil, i, |j, r_ij| at(values, j, r_ij)).unwrap_or([0.0; N]));
-    let solids = (0..kind.len()).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
-    let extrapolated: Vec<(usize, T)> = solids.map(|i| (i, average(i))).collect();
-    if !extrapolated.is_empty() {
-        let real = frame.images.real(field);
-        extrapolated.into_iter().for_each(|(i, value)| real[i] = value);
-        frame.images.fill(field);
-    }
-}
-
-/// Solid particles show the mean of what the fluid around them has: ∂/∂n = 0.
-pub fn extrapolate_scalar<const D: usize>(settings: &Settings, frame: &Frame<D>, kind: &[ParticleKind], field: &mut [f64]) {
-    extrapolate(settings, frame, kind, field, |field, j, _| [field[j]], |[mean]| mean);
-}
-
-/// [`extrapolate_scalar`] of a vector.
-pub fn extrapolate_vector<const D: usize>(
-    settings: &Settings,
-    frame: &Frame<D>,
-    kind: &[ParticleKind],
-    field: &mut [Vector<D>],
-) {
-    extrapolate(settings, frame, kind, field, |field, j, _| field[j].into(), Vector::<D>::from);
-}
-
-/// The pressure of solid particles: the Shepard average of the fluid's, with the hydrostatic term (Adami, Hu and Adams 2012, eq. 27; bodies
-/// do not accelerate) or continued along its `gradient`, which only the rule [`WallPressure::Linear`] reads.
-pub fn extrapolate_pressure<const D: usize>(
-    settings: &Settings,
-    frame: &Frame<D>,
-    Particles { real, kind, pressure, .. }: &mut Particles<D>,
-    gradient: &[Vector<D>],
-) {
-    let hydrostatic = Vector::<D>::from_column_slice(&settings.body_force) * settings.density;
-    let slope = |j: usize| if settings.wall_pressure == WallPressure::Linear { gradient[j] } else { hydrostatic };
-    let continued = |pressure: &[f64], j: usize, r_ij: Vector<D>| [pressure[j] + slope(j).dot(&r_ij)];
-    extrapolate(settings, frame, &kind[..*real], pressure, continued, |[pressure]| pressure);
-}
-
-/// `f(j, W_ij, r_ij)` for those of the neighbours `near` of particle `i`, each with how much is seen of it, a factor of W, that are in its
-/// support. Others of its cluster's may be there too, and what they carry may be stale.
-pub fn for_each_weighted<const D: usize>(
-    settings: &Settings,
-    stencil: &Stencil<D>,
-    i: usize,
-    near: impl Iterator<Item = (Entry, f64)>,
-    mut f: impl FnMut(usize, f64, Vector<D>),
-) {
-    with_kernel!(settings.kernel, K => {
-        let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
-        for (entry, share) in near {
-            let r_ij = stencil.position[i] - stencil.position[entry.j()];
-            let weight = share * kernel.value(r_ij.norm());
-            if weight != 0.0 {
-                f(entry.j(), weight, r_ij);
-            }
-        }
-    });
 }

@@ -1,10 +1,13 @@
 //! Derivatives at one set of positions: volumes, slopes and corrections (the stencil), and what passes over them sum (operators).
 
+mod correction;
+mod operator;
 mod operators;
+mod printed;
 mod stencil;
 
-pub use operators::{
-    Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, Neighbours, Nothing, Operator, VelocityGradient,
-    vector_laplacian,
-};
-pub use stencil::{Corrected, Correction, Stencil};
+pub use correction::Correction;
+pub use operator::{Neighbours, Nothing, Operator};
+pub use operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, VelocityGradient};
+pub use printed::vector_laplacian;
+pub use stencil::{Corrected, Stencil};

@@ -5,36 +5,8 @@
 
 use crate::base::lanes::{LANES, Lanes, add_product, matrices, vectors};
 use crate::base::{Matrix, Vector};
-use crate::discretisation::{Correction, Stencil};
-use crate::neighbours::{Cluster, Entry};
-
-/// A cluster and its neighbours as an operator sees them. It must go over every neighbour once, then ask for the corrections.
-pub trait Neighbours<V: Lanes, const D: usize> {
-    fn cluster(&self) -> Cluster;
-
-    /// Call `add(j, slope, r_ij)` for each neighbour.
-    fn for_each(&mut self, add: impl FnMut(usize, V, [V; D]));
-
-    /// Call `add(j, slope, r_ij)` for each fluid or buffer neighbour.
-    fn for_each_flowing(&mut self, add: impl FnMut(usize, V, [V; D]));
-
-    /// Call `add(s, slope, r_is)` for each solid neighbour.
-    fn for_each_solid(&mut self, add: impl FnMut(usize, V, [V; D]));
-
-    /// The correction of each lane.
-    fn corrections(&mut self) -> [Correction<D>; LANES];
-}
-
-/// A quantity formed from the neighbours of every particle.
-pub trait Operator<const D: usize>: Sync {
-    type Value;
-
-    /// The value at the particle of each lane. Mark `#[inline(always)]`, see [`crate::base::lanes::Task`].
-    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [Self::Value; LANES];
-}
-
-/// Nothing, for what a pass over the neighbours does beside its operator.
-pub struct Nothing;
+use crate::discretisation::correction::Correction;
+use crate::discretisation::operator::{Neighbours, Operator};
 
 /// ∇f. (15)
 pub struct Gradient<'a>(pub &'a [f64]);
@@ -53,20 +25,6 @@ pub struct GradientAndLaplacian<'a>(pub &'a [[f64; 2]]);
 pub struct LaplacianAndGradient<'a, const D: usize, F> {
     pub velocity: &'a [Vector<D>],
     pub seen: F,
-}
-
-impl<const D: usize> Operator<D> for Nothing {
-    type Value = ();
-
-    #[inline(always)]
-    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [(); LANES] {
-        near.for_each(
-            #[inline(always)]
-            |_, _, _| (),
-        );
-        near.corrections();
-        [(); LANES]
-    }
 }
 
 impl<const D: usize> Operator<D> for Gradient<'_> {
@@ -176,27 +134,6 @@ impl<const D: usize, F: Fn(usize, usize) -> Vector<D> + Sync> Operator<D> for La
             ((laplacian[lane] + linear) * *factor, tensor[lane] * inverse)
         })
     }
-}
-
-/// ∇²u + 2∇(∇·u) at particle `i`, which (16) gives as printed: the vector form with the correction tensor. Solid neighbours
-/// show the velocity that `solid` gives.
-#[inline(never)]
-pub fn vector_laplacian<const D: usize>(
-    stencil: &Stencil<D>,
-    velocity: &[Vector<D>],
-    i: usize,
-    solid: impl Fn(usize) -> Vector<D>,
-) -> Vector<D> {
-    let (row, lane) = stencil.neighbours.row(i);
-    let mut sum = Vector::zeros();
-    let mut add = |entry: &Entry, u_j: Vector<D>| {
-        let r_ij = stencil.position[i] - stencil.position[entry.j()];
-        let radial = (velocity[i] - u_j).dot(&r_ij) / r_ij.norm_squared().max(f64::MIN_POSITIVE);
-        sum += r_ij * (radial * entry.slope(lane));
-    };
-    row.flowing().iter().for_each(|entry| add(entry, velocity[entry.j()]));
-    row.solid().iter().for_each(|entry| add(entry, solid(entry.j())));
-    stencil.correction[i].inverse * sum * (2.0 * (D as f64 + 2.0))
 }
 
 /// Σ slope (u_j − u_i) r_ijᵀ: ∇u before its correction.

@@ -3,15 +3,13 @@
 use crate::base::lanes::{LANES, Lanes, from, matrices, norm_squared, vectors};
 use crate::base::parallel;
 use crate::base::{Matrix, Vector};
-use crate::discretisation::{Neighbours, Nothing, Operator};
+use crate::discretisation::correction::Correction;
+use crate::discretisation::operator::{Neighbours, Nothing, Operator};
 use crate::kernel::{Kernel, Smoothing, with_kernel};
 use crate::neighbours::{Cluster, Entry, NeighbourList, Row, RowMut, Visit, VisitMut};
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 use std::ops::Range;
-
-/// Inverse correction tensors with a larger norm are taken for singular: too few neighbours for a gradient.
-const SINGULAR: f64 = 1e3;
 
 #[derive(Debug, Default)]
 pub struct Stencil<const D: usize> {
@@ -29,18 +27,6 @@ pub struct Stencil<const D: usize> {
     /// Whether the Laplacian of a particle is corrected for the asymmetry of its neighbours: that of fluid, if asked for. At the cut
     /// ends of buffers and walls the asymmetry stays, and makes the compact Laplacian a condition of no flux.
     balanced: Vec<bool>,
-}
-
-/// What the sums over a particle's neighbours are corrected with.
-#[derive(Clone, Copy, Debug)]
-pub struct Correction<const D: usize> {
-    /// α⁻¹, or the identity where α is singular.
-    pub inverse: Matrix<D>,
-    /// −2(D+2) / (2 + tr α).
-    pub laplacian: f64,
-    /// α⁻¹ Σ slope r_ij: times the sum of ∇f before its correction, what a uniform gradient takes from the sum of ∇²f where
-    /// neighbours are not evenly spread. Zero if that is to stay.
-    pub asymmetry: Vector<D>,
 }
 
 impl<const D: usize> Stencil<D> {
@@ -398,22 +384,5 @@ where
         let (alpha, asymmetry) = ([[V::zero(); D]; D], [V::zero(); D]);
         let mut near = Correcting { cluster, row, position, volume, nominal, balanced, alpha, asymmetry, correction };
         hand_out(cluster, self.operator.apply::<V>(&mut near), a, b, &self.f);
-    }
-}
-
-impl<const D: usize> Correction<D> {
-    /// From α and Σ slope r_ij.
-    #[inline(always)]
-    fn of(alpha: &Matrix<D>, asymmetry: Vector<D>) -> Self {
-        let inverse = match alpha.try_inverse() {
-            Some(inverse) if inverse.norm_squared() < SINGULAR * SINGULAR => inverse,
-            _ => Matrix::identity(),
-        };
-        Self { inverse, laplacian: -2.0 * (D as f64 + 2.0) / (2.0 + alpha.trace()), asymmetry: inverse * asymmetry }
-    }
-
-    /// Whether α is singular: no tensor that is not has just the identity as its inverse, α being a sum in single precision.
-    pub fn is_singular(&self) -> bool {
-        self.inverse == Matrix::<D>::identity()
     }
 }

@@ -7,7 +7,7 @@ use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian, Laplacia
 use crate::flow::{Flow, Step};
 use crate::halo::Poison;
 use crate::particles::{ParticleKind, Particles};
-use crate::scheme::projection::{Projection, relaxation};
+use crate::scheme::projection::{Projection, Sweeps};
 use crate::scheme::viscous::sharpen;
 use crate::scheme::{Outcome, Scheme};
 use crate::settings::{DerivativeFrame, Eigenvalues, Settings, TimeStepLimits, VelocityLaplacian, WallPressure};
@@ -52,24 +52,19 @@ pub struct Coefficients {
     /// r_AL of the step.
     penalty: f64,
     largest: Eigenvalues,
-    /// σ of the projection sweeps, a length squared.
-    pub relaxation: f64,
+    sweeps: Sweeps,
     /// The error of the compact Laplacian of a wave over its square wave number, a length squared.
     dispersion: f64,
-    /// One over the largest eigenvalue of the compact Laplacian, a length squared: so much of it takes the shortest waves off.
-    pub shortest: f64,
 }
 
 impl Coefficients {
     fn new(settings: &Settings) -> Self {
         let largest = settings.largest_eigenvalues();
-        let area = settings.particle_spacing.powi(2);
         Self {
             penalty: f64::NAN,
             largest,
-            relaxation: relaxation(settings, largest),
-            dispersion: settings.laplacian_dispersion() * area,
-            shortest: area / largest.laplacian,
+            sweeps: Sweeps::new(settings, largest),
+            dispersion: settings.laplacian_dispersion() * settings.particle_spacing.powi(2),
         }
     }
 }
@@ -90,7 +85,8 @@ impl<const D: usize> Scheme<D> for Alsph<D> {
             self.update_pressure(step, flow); // (10) (20)
             self.correct_velocity(step, flow); // (11)
             if iteration == step.settings.max_iterations {
-                self.projection.sweep(step, self.coefficients, flow, &self.derived);
+                let derived = &self.derived;
+                self.projection.sweep(step, self.coefficients.sweeps, flow, |i| derived[i].solenoidal);
             }
             if step.settings.derivative_frame == DerivativeFrame::Updated {
                 flow.advance_positions(step); // (12): Algorithm 1 takes its derivatives at r^{n+1,m}

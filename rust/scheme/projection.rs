@@ -23,8 +23,6 @@ use crate::boundary::{PressureRule, VelocityRule, conditions, extrapolate_scalar
 use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian};
 use crate::flow::{Flow, Step};
 use crate::particles::Particles;
-use crate::scheme::Derived;
-use crate::scheme::alsph::Coefficients;
 use crate::settings::{Eigenvalues, Settings, SweepPressure, SweepWeights};
 
 /// κ: the share of a sweep's potential that the pressure keeps. The rest of it is mostly noise of the one step; all of the
@@ -41,9 +39,20 @@ const CHEBYSHEV_DEGREE: usize = 4;
 /// What disordered particles may add to the largest eigenvalue of the lattice.
 const EIGENVALUE_MARGIN: f64 = 1.1;
 
-/// σ of the sweeps.
-pub fn relaxation(settings: &Settings, largest: Eigenvalues) -> f64 {
-    settings.particle_spacing.powi(2) / (EIGENVALUE_MARGIN * largest.projection)
+/// What the sweeps are multiplied with, lengths squared.
+#[derive(Clone, Copy, Debug)]
+pub struct Sweeps {
+    /// σ.
+    relaxation: f64,
+    /// One over the largest eigenvalue of the compact Laplacian: so much of it takes the shortest waves off.
+    shortest: f64,
+}
+
+impl Sweeps {
+    pub fn new(settings: &Settings, largest: Eigenvalues) -> Self {
+        let area = settings.particle_spacing.powi(2);
+        Self { relaxation: area / (EIGENVALUE_MARGIN * largest.projection), shortest: area / largest.laplacian }
+    }
 }
 
 #[derive(Debug, Default)]
@@ -82,17 +91,16 @@ impl Projection {
         share / PRESSURE_SHARE - kept
     }
 
-    /// All sweeps of one step. They take off what ∇·u has beyond [`Derived::solenoidal`].
+    /// All sweeps of one step. They take off what ∇·u of a particle has beyond `solenoidal`.
     pub fn sweep<const D: usize>(
         &mut self,
         step: Step,
-        coefficients: Coefficients,
+        Sweeps { relaxation, shortest }: Sweeps,
         Flow { particles, frame, .. }: &mut Flow<D>,
-        derived: &[Derived<D>],
+        solenoidal: impl Fn(usize) -> f64 + Sync,
     ) {
         self.pressure_before.extend_from_slice(&particles.pressure);
         let Step { settings, time_step, .. } = step;
-        let Coefficients { relaxation, shortest, .. } = coefficients;
         let Particles { real, kind, position, pressure, velocity, .. } = particles;
         let (kind, position) = (&kind[..*real], &*position);
         let condition = conditions(settings);
@@ -104,7 +112,7 @@ impl Projection {
             frame.stencil.for_each_one(Divergence(velocity), frame.images.real(divergence), |i, value, out| {
                 *out = match condition(kind[i], &position[i]).pressure {
                     PressureRule::Zero | PressureRule::SolvedWithoutDivergence => 0.0,
-                    PressureRule::Solved | PressureRule::FromFluid => value - derived[i].solenoidal,
+                    PressureRule::Solved | PressureRule::FromFluid => value - solenoidal(i),
                 };
             });
             extrapolate_scalar(settings, frame, kind, divergence);
