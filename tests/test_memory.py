@@ -13,6 +13,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memor
 WITHIN = """
 import resource, sys
 from pathlib import Path
+import alsph.cli.of_cases  # what is loaded is not counted
 from alsph.cli import main
 size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 resource.setrlimit(resource.RLIMIT_AS, (size + int(sys.argv.pop(1)) * 2**20, resource.getrlimit(resource.RLIMIT_AS)[1]))

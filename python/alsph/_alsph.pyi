@@ -12,6 +12,7 @@ __all__ = [
     "__version__",
     "bytes_per_particle",
     "instructions",
+    "kernels",
     "time_step_limits",
 ]
 
