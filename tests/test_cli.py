@@ -65,6 +65,7 @@ def test_what_is_not_used_is_not_loaded(program, loaded):
 def test_the_list_of_commands_says_what_each_says_of_itself(alsph, name):
     code, stdout, _ = alsph(name, "--help")
     assert (code, COMMANDS[name][1].removesuffix(".") in " ".join(stdout.split())) == (0, True)
+    assert "╭" not in stdout  # plain text in every terminal and file
 
 
 def test_a_mistyped_command_is_guessed(alsph):

@@ -72,7 +72,7 @@ def _converge(
     raise typer.Exit(not report.results.complete)
 
 
-app = typer.Typer(add_completion=False)
+app = typer.Typer(add_completion=False, rich_markup_mode=None)
 EPILOG = "The options are the parameters of the case: see CASE --help. They override those of a file."
 for _name, _action, _help in (
     ("run", _run, "Run a case, or a file, into a run folder."),

@@ -16,7 +16,7 @@ from alsph.running.control import seconds_of
 from alsph.running.repetition import repeat
 from alsph.running.start import resume
 
-app = typer.Typer(add_completion=False)
+app = typer.Typer(add_completion=False, rich_markup_mode=None)
 
 
 @app.command("resume")

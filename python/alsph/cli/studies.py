@@ -26,7 +26,7 @@ class StudyGroup(TyperGroup):
         return super().parse_args(ctx, args)
 
 
-app = typer.Typer(add_completion=False)
+app = typer.Typer(add_completion=False, rich_markup_mode=None)
 study_app = typer.Typer(
     cls=StudyGroup,
     no_args_is_help=True,
