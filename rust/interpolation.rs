@@ -64,15 +64,15 @@ fn shape_functions<const D: usize>(
         let functions: Vec<_> = away.iter().map(|r| functions(r, count)).collect();
         fit(&functions, &weights, total)
     });
-    let amplification = |fit: &Vec<f64>| fit.iter().map(|weight| weight.abs()).sum::<f64>();
-    let [quadratic, linear] = fits;
-    let sound = [quadratic, linear].into_iter().find(|fit| amplification(fit) < LARGEST_AMPLIFICATION);
-    Some(sound.unwrap_or_else(|| weights.iter().map(|w| w / total).collect()))
+    let sound = |fit: &Vec<f64>| fit.iter().map(|weight| weight.abs()).sum::<f64>() < LARGEST_AMPLIFICATION;
+    let [(quadratic, all_told), (linear, _)] = fits;
+    let fitted = if all_told && sound(&quadratic) { quadratic } else { linear };
+    Some(if sound(&fitted) { fitted } else { weights.iter().map(|w| w / total).collect() })
 }
 
-/// What each value counts in the value at the point of the least-squares fit of one and functions that vanish there; those that too
-/// few particles, or collinear ones, do not tell of are taken as zero.
-fn fit(functions: &[DVector<f64>], weights: &[f64], total: f64) -> Vec<f64> {
+/// What each value counts in the value at the point of the least-squares fit of one and functions that vanish there; and whether the
+/// particles tell of all of these: those that too few, or collinear ones, do not tell of are taken as zero.
+fn fit(functions: &[DVector<f64>], weights: &[f64], total: f64) -> (Vec<f64>, bool) {
     let count = functions[0].len();
     // About the mean, where the fit is the mean of the values whatever its coefficients.
     let mean = functions.iter().zip(weights).fold(DVector::zeros(count), |mean, (f, w)| mean + f * (w / total));
@@ -85,5 +85,6 @@ fn fit(functions: &[DVector<f64>], weights: &[f64], total: f64) -> Vec<f64> {
     let SymmetricEigen { eigenvalues, eigenvectors } = moments.symmetric_eigen();
     let told = eigenvalues.map(|value| if value > 1e-6 * total { 1.0 / value } else { 0.0 });
     let slope = &eigenvectors * (eigenvectors.transpose() * &mean).component_mul(&told);
-    functions.iter().zip(weights).map(|(f, w)| w * (1.0 / total - (f - &mean).dot(&slope))).collect()
+    let counts = functions.iter().zip(weights).map(|(f, w)| w * (1.0 / total - (f - &mean).dot(&slope))).collect();
+    (counts, told.iter().all(|told| *told > 0.0))
 }

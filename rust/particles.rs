@@ -132,9 +132,17 @@ impl<const D: usize> Particles<D> {
 /// Bits of an id that an inlet particle shares with those that follow it; those above count them.
 const LINEAGE_BITS: u32 = 40;
 
-/// The id of the particle that follows an inlet particle at the far end of its buffer; None if there are no more.
-pub fn follower(id: u64) -> Option<u64> {
-    id.checked_add(1 << LINEAGE_BITS)
+/// How many particles may have followed each other before a simulation begins: as many may then follow.
+const MOST_FOLLOWERS: u64 = 1 << 23;
+
+/// The id of the particle that follows an inlet particle at the far end of its buffer.
+pub fn follower(id: u64) -> u64 {
+    id + (1 << LINEAGE_BITS)
+}
+
+/// Whether so many have followed each other that ids might run out.
+pub fn is_late(id: u64) -> bool {
+    id >> LINEAGE_BITS >= MOST_FOLLOWERS
 }
 
 /// What an id shares with those that follow it.

@@ -12,7 +12,7 @@ use crate::frame::Travel;
 use crate::interpolation::interpolate;
 use crate::loads::loads;
 use crate::neighbours::Grid;
-use crate::particles::{ParticleKind, Particles, follower, lineage};
+use crate::particles::{ParticleKind, Particles, is_late, lineage};
 use crate::report::{Clock, Report};
 use crate::scheme::{self, Outcome, Scheme};
 use crate::settings::{Boundary, Settings};
@@ -378,7 +378,7 @@ fn check_ids<const D: usize>(particles: &Particles<D>) -> Result<()> {
             return refuse(format!("{other} is one that follows inlet particle {id}: give ids below {}", 1u64 << 40));
         }
     }
-    match (0..particles.len()).find(|&i| particles.kind[i] == ParticleKind::Inlet && follower(particles.id[i]).is_none()) {
+    match (0..particles.len()).find(|&i| particles.kind[i] == ParticleKind::Inlet && is_late(particles.id[i])) {
         Some(i) => refuse(format!("{} of an inlet particle is too large", particles.id[i])),
         None => Ok(()),
     }

@@ -86,6 +86,16 @@ fn where_no_fluid_is_near_there_is_no_value() {
         assert_relative_eq!(p, exact.0, epsilon = 1e-12);
         assert_relative_eq!(u, exact.1, epsilon = 1e-12);
     }
+    // Of a few, what is linear.
+    let few: Vec<_> = [[0.53, 0.51], [0.48, 0.54], [0.51, 0.45], [0.46, 0.47], [0.55, 0.56]].map(Vector::from).to_vec();
+    for count in [3, 4, 5] {
+        let point = Vector::from([0.5, 0.5]);
+        let exact = linear(&point);
+        for (p, u) in sampled(linear, 0.1, common::particles(few[..count].to_vec()), &[point]) {
+            assert_relative_eq!(p, exact.0, epsilon = 1e-10);
+            assert_relative_eq!(u, exact.1, epsilon = 1e-10);
+        }
+    }
     let known = values.iter().map(|(p, u)| p.is_finite() && u.iter().all(|u| u.is_finite()));
     assert_eq!(known.collect::<Vec<_>>(), [true, true, false, false, false]);
 }

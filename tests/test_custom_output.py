@@ -7,7 +7,8 @@ import pytest
 from alsph import cases, resume
 from alsph.analysis import sampling
 from alsph.cases import TaylorGreen
-from alsph.errors import ConfigError
+from alsph.errors import ConfigError, RunFolderError
+from alsph.folder.durable import replacing
 
 
 class Gauge:
@@ -33,8 +34,9 @@ class Gauge:
 
     def truncate(self, path, time):
         """Drop later rows."""
-        rows = [row for row in path.read_text().splitlines(True) if float(row.split(",")[0]) <= time]
-        path.write_text("".join(rows))
+        rows = [row for row in path.read_text().splitlines(True) if row.endswith("\n")]
+        with replacing(path) as new:
+            new.write_text("".join(row for row in rows if float(row.split(",")[0]) <= time))
 
 
 class Gauged(TaylorGreen):
@@ -60,7 +62,7 @@ def test_a_cut_run_leaves_the_output_of_a_whole_one(case, tmp_path):
     case.run(tmp_path / "cut", until=0.09, threads=1, progress=False)
     late = tmp_path / "cut" / "output_gauge.csv"
     with late.open("a") as file:
-        file.write("0.15,7.0\n")  # later than the checkpoint
+        file.write("0.15,7.0\n0")  # later than the checkpoint, and torn
     resume(tmp_path / "cut", until=0.2, progress=False)
     rows = (whole.path / "output_gauge.csv").read_text()
     assert late.read_text() == rows
@@ -76,12 +78,32 @@ def test_a_cut_run_leaves_the_output_of_a_whole_one(case, tmp_path):
 
 def test_a_folder_that_is_replaced_keeps_no_old_output(case, tmp_path):
     case.run(tmp_path / "run", until=0.05, progress=False)
+    (tmp_path / "run" / "output_film.mp4").write_text("the user's own")
     TaylorGreen(resolution=8).run(tmp_path / "run", until=0.02, force=True, progress=False)
     assert not (tmp_path / "run" / "output_gauge.csv").exists()
+    assert (tmp_path / "run" / "output_film.mp4").exists()
+
+
+def test_what_fails_in_an_output_is_told_with_its_name(case, tmp_path, monkeypatch):
+    monkeypatch.setattr(Gauge, "append", lambda self, path: path.write_text(3))
+    with pytest.raises(RunFolderError, match="output output_gauge.csv: TypeError"):
+        case.run(tmp_path / "run", until=0.02, progress=False)
+
+
+def test_two_outputs_of_a_file_are_refused(case, tmp_path, monkeypatch):
+    monkeypatch.setattr(Gauged, "outputs", lambda self: [Gauge([0.2, 0.2]), Gauge([0.3, 0.3])])
+    with pytest.raises(ConfigError, match="2 outputs have the file output_gauge.csv"):
+        case.run(tmp_path / "run", until=0.02, progress=False)
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "text"), [("file", "gauge.csv", "output_NAME"), ("interval", 0.0, "above zero")]
+    ("name", "value", "text"),
+    [
+        ("file", "gauge.csv", "output_NAME"),
+        ("interval", 0.0, "above zero"),
+        ("interval", "0.1", "above zero"),
+        ("file", 3, "output_NAME"),
+    ],
 )
 def test_an_output_that_cannot_be_is_refused_before_anything_is_written(case, tmp_path, monkeypatch, name, value, text):
     monkeypatch.setattr(Gauge, name, value)

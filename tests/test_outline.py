@@ -345,7 +345,10 @@ def test_shapes_made_in_python_are_bodies_that_run_resume_and_repeat(tmp_path):
     assert run.config.case.outline.area == pytest.approx(shapely.Polygon(ELLIPSE).area)
     assert resume(run.path, until=0.1, progress=False).status == "finished"
     assert repeat(run.path).same
-    pair = Body(shape=shapely.MultiPolygon([shapely.Polygon(ELLIPSE), shapely.Polygon(ELLIPSE + [0, 1])]))
+    polygons = [shapely.Polygon(ELLIPSE), shapely.Polygon(ELLIPSE + [0, 1])]
+    pair = Body(shape=shapely.MultiPolygon(polygons))
+    assert pair == pair.replace(shape=polygons) == pair.replace(shape=[ELLIPSE, ELLIPSE + [0, 1]])
+    assert Body(shape=[ELLIPSE, ELLIPSE[::2] + [0, 1]]).shape.polygons[1].area > 0
     assert [body["name"] for body in pair.bodies()] == ["body_1", "body_2"]
 
 
@@ -356,6 +359,9 @@ def test_shapes_made_in_python_are_bodies_that_run_resume_and_repeat(tmp_path):
         ([], "must be points (n, 2) of a closed curve"),
         (np.zeros((3, 3)), "must be points (n, 2) of a closed curve"),
         ([["a", "b"], ["c", "d"]], "must be points (n, 2) of a closed curve"),
+        ({"x": [1.0], "y": [2.0]}, "unknown parameter"),
+        ([[10**400, 0], [1, 0], [0, 1]], "must be points (n, 2) of a closed curve"),
+        (ELLIPSE * 1j, "coordinates must be two real numbers"),
         (ELLIPSE[:2], 'points:1: "0.5 0.0": begins a curve of too few points'),
         (ELLIPSE * [1, np.nan], "coordinates must be finite"),
         (np.zeros((20_001, 2)), "has more than 20000 points"),

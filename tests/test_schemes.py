@@ -53,7 +53,10 @@ def test_the_walls_pressure_goes_with_the_scheme():
     assert {name: Cylinder(scheme=name).wall_pressure for name in own} == own
     assert {name: Cylinder().replace(scheme=name).wall_pressure for name in own} == own
     assert Cylinder(scheme="edac").replace(scheme="alsph").wall_pressure == Cylinder().wall_pressure == "linear"
-    assert Cylinder(scheme="edac", wall_pressure="linear").replace(resolution=8).wall_pressure == "linear"
+    assert Cylinder(scheme="edac").replace(scheme=None).wall_pressure == "linear"
+    given = Cylinder(scheme="edac", wall_pressure="linear")
+    assert given.replace(resolution=8).wall_pressure == given.replace(scheme="wcsph").wall_pressure == "linear"
+    assert Cylinder(wall_pressure="paper").replace(scheme="alsph").wall_pressure == "paper"
 
 
 def test_the_step_follows_the_sound_and_is_described():

@@ -122,7 +122,7 @@ fn enter<const D: usize>(
         let new = particles.push_copy(i);
         particles.position[new] = position;
         particles.pressure[new] = pressure;
-        particles.id[new] = follower(particles.id[i]).expect("fewer than 2^24 follow each other");
+        particles.id[new] = follower(particles.id[i]);
         particles.kind[i] = ParticleKind::Fluid;
     }
     particles.real = particles.len();

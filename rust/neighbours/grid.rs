@@ -3,6 +3,7 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
+use std::ops::Range;
 
 /// Cells that the search radius reaches to either side: narrow cells fit the sphere closer than wide ones.
 const REACH: usize = 2;
@@ -12,7 +13,9 @@ const CELLS_PER_POINT: usize = 8;
 
 #[derive(Debug)]
 pub struct Grid<const D: usize> {
+    /// Where the first of all cells begins, and the first of those that are kept.
     origin: Vector<D>,
+    first: [usize; D],
     inverse_width: f64,
     cells: [usize; D],
     /// First entry of `items` of each cell, and the end.
@@ -36,6 +39,7 @@ impl<const D: usize> Default for Grid<D> {
     fn default() -> Self {
         Self {
             origin: Vector::zeros(),
+            first: [0; D],
             inverse_width: 1.0,
             cells: [1; D],
             starts: vec![0, 0],
@@ -47,22 +51,34 @@ impl<const D: usize> Default for Grid<D> {
 }
 
 impl<const D: usize> Grid<D> {
-    /// Sort `points`, each with its key, for searches within `radius`. Cells cover the box `bounds`, and no more: points beyond
-    /// share its border cells, so that strays cost no memory.
-    pub fn build(&mut self, points: &[Vector<D>], keys: &[u64], radius: f64, (lower, upper): (Vector<D>, Vector<D>)) {
-        if points.is_empty() {
+    /// Sort `points`, each with its key, for searches within `radius`. Cells are those of the box `bounds`, wherever the points are, as far
+    /// as these reach: points beyond share its border cells, so that strays cost no memory.
+    pub fn build(&mut self, points: &[Vector<D>], keys: &[u64], radius: f64, bounds: (Vector<D>, Vector<D>)) {
+        let Some(&point) = points.first() else {
             *self = Self::default();
             return;
-        }
-        self.origin = lower;
+        };
+        let corners = |range: Range<usize>| {
+            points[range].iter().fold((point, point), |(low, high), point| (low.inf(point), high.sup(point)))
+        };
+        let (lower, upper) =
+            parallel::reduce(points.len(), corners, |a, b| (a.0.inf(&b.0), a.1.sup(&b.1))).unwrap_or((point, point));
+        let (lower, upper) = (lower.sup(&bounds.0), upper.inf(&bounds.1));
+        // No number tells the cells of a box that is longer than any.
+        self.origin = if (upper - bounds.0).iter().all(|extent| extent.is_finite()) { bounds.0 } else { lower };
+        let (lower, upper) = (lower - self.origin, upper - self.origin);
         // A hair wider, so that rounding cannot put a neighbour one cell farther away.
         let mut width = radius / REACH as f64 * (1.0 + 1e-9);
         let most = (CELLS_PER_POINT * points.len()).max(64) as f64;
-        let cells = |width: f64| (upper - lower).map(|extent| (extent.max(0.0) / width).floor() + 1.0);
+        let first = |width: f64| lower.map(|x| (x.max(0.0) / width).floor());
+        let cells = |width: f64| {
+            (upper.map(|x| (x.max(0.0) / width).floor()) - first(width)).add_scalar(1.0).sup(&Vector::repeat(1.0))
+        };
         while cells(width).iter().product::<f64>() > most && width.is_finite() {
             width *= 2.0;
         }
-        let counts = cells(width);
+        let (counts, first) = (cells(width), first(width));
+        self.first = std::array::from_fn(|axis| first[axis] as usize);
         self.cells = std::array::from_fn(|axis| counts[axis] as usize);
         self.inverse_width = 1.0 / width;
         self.counting_sort(points, keys);
@@ -159,7 +175,8 @@ impl<const D: usize> Grid<D> {
     fn cell(&self, point: &Vector<D>) -> [usize; D] {
         // A float-to-integer cast saturates, so points outside the box land in its border cells.
         std::array::from_fn(|axis| {
-            (((point[axis] - self.origin[axis]) * self.inverse_width) as usize).min(self.cells[axis] - 1)
+            let cell = ((point[axis] - self.origin[axis]) * self.inverse_width) as usize;
+            cell.saturating_sub(self.first[axis]).min(self.cells[axis] - 1)
         })
     }
 

@@ -36,16 +36,22 @@ def _as_in_the_paper(values: Mapping[str, Any]) -> bool:
     return any(values.get(name) is not None for name in PAPER) or values.get("algorithm") not in (None, "midpoint")
 
 
-def superseded(changes: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the parameters whose place others take.
+def _wall_pressure(scheme: Any) -> str:
+    """Return the rule of the walls' pressure of a scheme where none is given."""
+    return "adami" if scheme in tuple(DIFFUSION) else "linear"
+
+
+def superseded(changes: Mapping[str, Any], before: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the parameters whose place others take, of a case that had those of `before`.
 
     A Courant number takes that of the paper's pair, which takes its; the coefficient of a shifting goes with its kind,
-    the rule of the walls' pressure with the scheme.
+    the rule of the walls' pressure with the scheme, if it was the scheme's.
     """
     others: tuple[str, ...] = ()
     if any(changes.get(name) is not None for name in ("shifting", "dimensions")):
         others += ("shift_coefficient",)
-    if changes.get("scheme") is not None:
+    schemes = [table.get("scheme") or "alsph" for table in (before, {**before, **changes})]
+    if schemes[0] != schemes[1] and before.get("wall_pressure") == _wall_pressure(schemes[0]):
         others += ("wall_pressure",)
     if changes.get("courant") is not None:
         return (*PAPER, *others)
@@ -180,7 +186,7 @@ class Method(Parameters):
             kind = values.get("shifting")
             values = values | {"shift_coefficient": strain if kind in (None, "strain") else 0.04}
         if values.get("wall_pressure") is None:
-            values = values | {"wall_pressure": "adami" if values.get("scheme") in tuple(DIFFUSION) else "linear"}
+            values = values | {"wall_pressure": _wall_pressure(values.get("scheme"))}
         if values.get("courant") is not None:
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")
@@ -212,7 +218,7 @@ class Method(Parameters):
 
     def replace(self, **changes: Any) -> Self:
         """Return a case with some parameters changed; see `superseded`."""
-        return super().replace(**dict.fromkeys(superseded(changes)) | changes)
+        return super().replace(**dict.fromkeys(superseded(changes, dict(self))) | changes)
 
     @property
     def is_weakly_compressible(self) -> bool:

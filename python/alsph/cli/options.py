@@ -52,7 +52,8 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
     def command(context: typer.Context, **values: Any) -> None:
         extra = {parameter.name: values.pop(parameter.name) for parameter in own}
         tables = (context.obj or Config(model())).tables()
-        for name in cases.method.superseded(values):
+        given = {name: value for name, value in values.items() if value is not None}
+        for name in cases.method.superseded(given, tables):
             tables.pop(name, None)
         for name, value in values.items():
             if value is not None:

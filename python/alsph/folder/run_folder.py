@@ -47,7 +47,6 @@ MARKS = ("case.toml", "run.json")
 OWN = re.compile(
     r"\.?(case\.toml|run\.json|run\.log|\.?lock|(checkpoint(\.previous)?|history|particles|surface|start|breakdown)(\.damaged\d*)?"
     r"\.(h5|csv|vtkhdf))(\.new|\.journal)?"
-    r"|output_\w+(\.damaged\d*)?\.\w+"
     r"|(ledger|forces|spectrum|pressure(_coefficient)?|vorticity|velocity(_divergence|_at_tu_d_\w+)?|kinetic_energy"
     r"|[uv]_at_[xy]_d_2)\.png"
 )
@@ -169,13 +168,15 @@ class RunFolder:
     def create(self, configuration: Declared, size: int = 0) -> None:
         """Begin with the resolved configuration if `size` bytes will fit; alsph's own files of before are removed."""
         self._make_room(size)
+        outputs = [re.escape(str(name)) for name in self.last_info().get("outputs", ())]
+        own = re.compile("|".join([OWN.pattern, *(rf"\.?{name}(\.new|\.journal)?" for name in outputs)]))
         with self._writing():
             self.path.mkdir(parents=True, exist_ok=True)
             if self._file("run.json").exists():
                 self.announce(configuration)  # before the run that it tells of is no more
             for path in [*self.path.iterdir(), *self._file("figures").glob("*.png")]:
                 # What tells that this is a run folder stays, so that a cut leaves one.
-                if OWN.fullmatch(path.name) and path.name not in (*MARKS, LOCK) and not path.is_dir():
+                if own.fullmatch(path.name) and path.name not in (*MARKS, LOCK) and not path.is_dir():
                     path.unlink()
             with suppress(OSError):  # unless there is something of the user's in it
                 self._file("figures").rmdir()
@@ -235,6 +236,28 @@ class RunFolder:
                 self.log(f"warning: {remark}")
                 warnings.warn(f"{self.path}: {remark}", RuntimeWarning, stacklevel=2)
                 append(path)
+
+    def append_output(self, output: Output) -> None:
+        """Append what an output has recorded.
+
+        Raises
+        ------
+        RunFolderError
+            If it fails, whatever its error: it names the output.
+        """
+        if OWN.fullmatch(output.file):
+            self.append(output.file, output.append)
+        else:
+            self._make_room(0)
+            self._ask(output, output.append)
+
+    def _ask(self, output: Output, change: Callable[[Path], None]) -> None:
+        """Let an output that is not alsph's change its file."""
+        with self._writing():
+            try:
+                change(self._file(output.file))
+            except Exception as error:
+                raise RunFolderError(f"{self.path}: output {output.file}: {type(error).__name__}: {error}") from error
 
     def write_breakdown(self, outputs: list[tuple[float, dict[str, NDArray[Any]]]]) -> Path:
         """Replace ``breakdown.vtkhdf``: the particles before and after the step that broke down."""
@@ -309,10 +332,16 @@ class RunFolder:
                 "history.csv": lambda path: _truncate_history(path, step),
                 "particles.vtkhdf": lambda path: vtkhdf.truncate(path, time),
             }
-            parts |= {output.file: partial(output.truncate, time=time) for output in outputs}
+            outputs = list(outputs)
+            parts |= {
+                output.file: partial(output.truncate, time=time) for output in outputs if OWN.fullmatch(output.file)
+            }
             if step == 0:
-                for name in parts:
+                for name in (*parts, *(output.file for output in outputs)):
                     self._file(name).unlink(missing_ok=True)
+            for output in outputs:
+                if output.file not in parts and self._file(output.file).exists():
+                    self._ask(output, partial(output.truncate, time=time))
             for name, cut in parts.items():
                 if self._file(name).exists() and (remark := _unless_damaged(self._file(name), cut)):
                     damaged.append(remark)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import accumulate, chain, pairwise
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import shapely
@@ -123,15 +123,11 @@ class Outline(Parameters):
         ConfigError
             If it is no outline; the message names the point.
         """
-        if isinstance(shape, shapely.Geometry):
-            polygons = list(shapely.get_parts(shape))
-            if not all(isinstance(polygon, shapely.Polygon) and not polygon.interiors for polygon in polygons):
-                raise ConfigError(f"must be of polygons without holes, not {shape.geom_type}")
-            shape = [shapely.get_coordinates(polygon.exterior)[:-1] for polygon in polygons]
         try:
-            one = np.ndim(shape[0]) == 1 and len(shape[0]) == 2  # type: ignore[index, arg-type]
-            curves = [np.asarray(curve, float) for curve in ([shape] if one else shape)]  # type: ignore[union-attr]
-        except (TypeError, ValueError, IndexError):
+            curves = [np.asarray(curve, float) for part in _in_shape(shape) for curve in _corners(part)]
+        except ConfigError:
+            raise
+        except Exception:  # whatever an object of another library does
             raise ConfigError(cls.FORMS) from None
         if not curves or any(curve.ndim != 2 or curve.shape[1] != 2 or not len(curve) for curve in curves):
             raise ConfigError(cls.FORMS)
@@ -177,6 +173,25 @@ class Outline(Parameters):
         counts = ", ".join(str(len(polygon.exterior.coords) - 1) for polygon in self.polygons)
         bodies = "a body" if len(self.polygons) == 1 else f"{len(self.polygons)} bodies"
         return _shown(f"{self.file}: {bodies} of {counts} points" + (f"; {self.remark}" if self.remark else ""))
+
+
+def _in_shape(shape: Any) -> list[Any]:
+    """Return the curves and polygons of a shape: itself, or those that it is a list of."""
+    if isinstance(shape, shapely.Geometry) or np.ndim(np.asarray(shape, object)) == 2:
+        return [shape]
+    return list(shape)
+
+
+def _corners(part: Any) -> list[Any]:
+    """Return the closed curves of a part of a shape."""
+    if not isinstance(part, shapely.Geometry):
+        if np.iscomplexobj(np.asarray(part)):
+            raise ConfigError("coordinates must be two real numbers a point")
+        return [part]
+    polygons = list(shapely.get_parts(part))
+    if not all(isinstance(polygon, shapely.Polygon) and not polygon.interiors for polygon in polygons):
+        raise ConfigError(f"must be of polygons without holes, not {part.geom_type}")
+    return [shapely.get_coordinates(polygon.exterior)[:-1] for polygon in polygons]
 
 
 def _shown(text: str) -> str:

@@ -152,7 +152,7 @@ class Driver:
     def _checkpoint(self, status: str = "running") -> None:
         self._flush()
         for output in self.outputs:
-            self.folder.append(output.file, output.append)
+            self.folder.append_output(output)
         if self.written != self.simulation.step:  # else it is there, and must not displace the one before
             state = self.simulation.state()
             self.folder.write_checkpoint(state, self.config.case_tables(), self.simulation.prescribed)
@@ -214,6 +214,7 @@ class Driver:
             "case_class": type(self.config.case).__qualname__,
             "inflow_function": self.simulation.inflow is not None,
             "began": self.began,
+            "outputs": [output.file for output in self.outputs],
             "segments": self.segments,
             "retries": self.retries,
         }

@@ -1,6 +1,7 @@
 """What a run records beside particles and history."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -52,10 +53,13 @@ def outputs_of(config: Config) -> list[Output]:
     """
     points, own = config.case.surface_points(), config.case.outputs()
     for output in own:
-        if not re.fullmatch(r"output_\w+\.\w+", output.file):
+        if not (isinstance(output.file, str) and re.fullmatch(r"output_\w+\.\w+", output.file)):
             raise ConfigError(
                 f"case '{config.case.name}': the file {output.file!r} of an output must be called output_NAME.csv"
             )
-        if not output.interval > 0:
+        if not (isinstance(output.interval, int | float) and output.interval > 0):
             raise ConfigError(f"output {output.file}: its interval, {output.interval!r}, must be above zero [D/U]")
+    for name, count in Counter(output.file for output in own).items():
+        if count > 1:
+            raise ConfigError(f"case '{config.case.name}': {count} outputs have the file {name}; one file, one output")
     return [*([SurfacePressure(points, config.run.surface_interval)] if points else []), *own]

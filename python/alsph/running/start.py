@@ -35,6 +35,7 @@ def start(config: Config, path: Path, control: Control | None = None, *, force: 
         folder.check_new(force=force, configuration=config)  # another process may have been faster
         folder.create(config, 3 * size_of(simulation.problem.state))
         folder.announce(config)
+        folder.truncate(0, 0.0, driver.outputs)
         for remark in remarks:
             folder.log(f"warning: {remark}")
         if isinstance(outline := getattr(config.case, "shape", None), Outline):
