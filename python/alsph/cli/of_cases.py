@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from alsph import cases
+from alsph.cli.app import COMMANDS
 from alsph.cli.options import Jobs, Retry, Scheduler, StudyOutput, Walltime, group_of_cases
 from alsph.cli.runs import say_run
 from alsph.cli.terminal import say, say_table
@@ -74,16 +75,11 @@ def _converge(
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None)
 EPILOG = "The options are the parameters of the case: see CASE --help. They override those of a file."
-for _name, _action, _help in (
-    ("run", _run, "Run a case, or a file, into a run folder."),
-    ("describe", _describe, "Tell beforehand what a run will take."),
-    ("autotune", _autotune, "Find the largest stable time step and the cheapest iterations."),
-    ("converge", _converge, "Run a case at several resolutions and judge its convergence."),
-):
+for _name, _action in (("run", _run), ("describe", _describe), ("autotune", _autotune), ("converge", _converge)):
     app.add_typer(
         typer.Typer(
             cls=group_of_cases(_action),
-            help=_help,
+            help=COMMANDS[_name][1],
             no_args_is_help=True,
             subcommand_metavar="CASE|FILE.toml [OPTIONS]",
             epilog=EPILOG,
