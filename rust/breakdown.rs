@@ -74,8 +74,8 @@ pub fn find<const D: usize>(
 
 /// V of a particle that is alone but for a few neighbours at the edge of its support.
 fn largest_volume(settings: &Settings) -> f64 {
-    let own = with_kernel!(settings.kernel, K => {
-        Smoothing::<K>::new(settings.smoothing_length(), settings.dimensions).value(0.0)
+    let own = with_kernel!(settings.kernel, kernel => {
+        Smoothing::new(kernel, settings.smoothing_length(), settings.dimensions).value(0.0)
     });
     1.0 / ((1.0 + LONELY) * own)
 }

@@ -29,8 +29,8 @@ pub fn interpolate<const D: usize>(
             if particles.kind[j] == ParticleKind::Solid { solid.push(j) } else { near.push(j) }
         }
     });
-    let weights = with_kernel!(settings.kernel, K => {
-        let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
+    let weights = with_kernel!(settings.kernel, kernel => {
+        let kernel = Smoothing::new(kernel, settings.smoothing_length(), D);
         let seen = |place: &Vector<D>| faces.sight(particles, settings.particle_spacing, &solid, point, place);
         shape_functions(&near, radius, particles, point, |place: &Vector<D>, distance| seen(place) * kernel.value(distance))
     })?;

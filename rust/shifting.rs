@@ -55,8 +55,8 @@ fn displacements<const D: usize, const SHARED: bool>(
     [time_step, velocity_max]: [f64; 2],
     change: &mut [Change<D>],
 ) {
-    with_kernel!(settings.kernel, K => {
-        let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
+    with_kernel!(settings.kernel, kernel => {
+        let kernel = Smoothing::new(kernel, settings.smoothing_length(), D);
         let stencil = &frame.stencil;
         let visitor = Displacement::<_, D, SHARED> { settings, kernel, particles, stencil, walls, time_step, velocity_max };
         stencil.neighbours.for_each(change, &mut vec![(); particles.real], visitor);
@@ -186,6 +186,7 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Displacement<'_, K, D, SHARE
     #[inline(always)]
     fn surroundings<V: Lanes>(&self, cluster: Cluster, row: Row<'_>) -> Surroundings<V, D> {
         let in_frame = &self.stencil.position;
+        let kernel = self.kernel;
         let Particles { position, velocity, .. } = self.particles;
         let here: [V; D] = cluster.vectors(position);
         let here_in_frame: [V; D] = cluster.vectors(in_frame);
@@ -197,7 +198,7 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Displacement<'_, K, D, SHARE
             // An odd last entry stands twice, the second time unused.
             let two_j = [two[0].j(), two[two.len() - 1].j()];
             let r = [from(here, &position[two_j[0]]), from(here, &position[two_j[1]])];
-            let ratios = self.kernel.ratios([norm_squared(r[0]), norm_squared(r[1])]);
+            let ratios = kernel.ratios([norm_squared(r[0]), norm_squared(r[1])]);
             for k in 0..two.len() {
                 let (j, r_ij, (q, inverse, value)) = (two_j[k], r[k], ratios[k]);
                 // The row also holds particles beyond the support of this lane, which must not count.

@@ -57,6 +57,7 @@ impl<const D: usize> Simulation<D> {
         threads: Option<usize>,
         scheme: Box<dyn Scheme<D>>,
     ) -> Result<Self> {
+        settings.validate()?;
         if settings.dimensions != D {
             return Err(setting("dimensions", format!("{} does not fit {D}-dimensional arrays", settings.dimensions)));
         }

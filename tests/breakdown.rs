@@ -117,7 +117,7 @@ fn fluid_is_lost_three_quarters_of_a_spacing_under_a_surface() {
 #[test]
 fn a_particle_is_alone_whose_neighbours_sum_to_a_quarter_of_its_own_kernel() {
     let settings = common::parse(&settings());
-    let own = Smoothing::<QuinticSpline>::new(settings.smoothing_length(), 2).value(0.0);
+    let own = Smoothing::new(QuinticSpline, settings.smoothing_length(), 2).value(0.0);
     let with_volume = |volume: f64| found(&self::settings(), TIME_STEP, |set| set.frame.stencil.volume[3] = volume);
     assert_eq!(with_volume(0.999 / (1.25 * own)), None);
     assert_eq!(with_volume(1.001 / (1.25 * own)), symptom(3, "volume", 1.001 / (1.25 * own)));

@@ -27,22 +27,12 @@ fn with_algorithm(mut value: Value, (frame, search, sweeps): Algorithm) -> Setti
     common::parse(&value)
 }
 
-/// Taylor-Green: u = −U e^{−8π²νt} cos 2πx sin 2πy, v = U e^{−8π²νt} sin 2πx cos 2πy in the unit square.
-fn taylor_green(side: usize, disorder: f64) -> Particles<2> {
-    let mut particles = common::particles(common::lattice::<2>(side, disorder));
-    for i in 0..particles.real {
-        let [x, y] = [0, 1].map(|k| 2.0 * PI * particles.position[i][k]);
-        particles.velocity[i] = Vector::from([-x.cos() * y.sin(), x.sin() * y.cos()]);
-        particles.pressure[i] = -0.25 * ((2.0 * x).cos() + (2.0 * y).cos());
-    }
-    particles
-}
-
 #[test]
 fn taylor_green_decays_as_the_exact_solution() {
     for algorithm in ALGORITHMS {
         let settings = with_algorithm(common::settings_value::<2>(1.0 / 32.0, "periodic"), algorithm);
-        let mut simulation = Simulation::new(settings, taylor_green(32, 0.0), Clock::default(), Some(2)).expect("valid");
+        let mut simulation =
+            Simulation::new(settings, common::taylor_green(32, 0.0), Clock::default(), Some(2)).expect("valid");
         simulation.advance_until(0.5, None).expect("stable");
         let time = simulation.clock().time;
         let decay = (-8.0 * PI * PI * 0.01 * time).exp();
@@ -66,7 +56,8 @@ fn taylor_green_decays_as_the_exact_solution() {
 fn algorithm_1_is_the_original_method_but_for_what_its_frame_tolerates() {
     let after = |algorithm| {
         let settings = with_algorithm(common::settings_value::<2>(1.0 / 32.0, "periodic"), algorithm);
-        let mut simulation = Simulation::new(settings, taylor_green(32, 0.1), Clock::default(), Some(1)).expect("valid");
+        let mut simulation =
+            Simulation::new(settings, common::taylor_green(32, 0.1), Clock::default(), Some(1)).expect("valid");
         simulation.advance(5, None).expect("stable");
         let particles = simulation.particles();
         let mut order: Vec<usize> = (0..particles.real).collect();
@@ -84,7 +75,7 @@ fn error_of_decay(frame: &'static str, time_step: f64) -> f64 {
     let mut value = common::settings_value::<2>(1.0 / 32.0, "periodic");
     (value["viscous_order"], value["time_step"]) = (4.into(), time_step.into());
     let settings = with_algorithm(value, (frame, false, 4));
-    let mut simulation = Simulation::new(settings, taylor_green(32, 0.0), Clock::default(), Some(2)).expect("valid");
+    let mut simulation = Simulation::new(settings, common::taylor_green(32, 0.0), Clock::default(), Some(2)).expect("valid");
     simulation.advance_until(0.1, None).expect("stable");
     let particles = simulation.particles();
     let (mut sum, mut square) = (0.0, 0.0);
@@ -117,7 +108,7 @@ fn projection_leaves_the_solenoidal_part() {
         value["max_iterations"] = 1.into();
         value["projection_sweeps"] = sweeps.into();
         value["shifting"] = "none".into();
-        let mut particles = taylor_green(32, 0.2);
+        let mut particles = common::taylor_green(32, 0.2);
         for i in 0..particles.real {
             let [x, y] = [0, 1].map(|k| 2.0 * PI * particles.position[i][k]);
             particles.velocity[i] += Vector::from([x.sin() * y.cos(), x.cos() * y.sin()]) * 0.3;
@@ -437,7 +428,7 @@ fn a_step_beyond_the_stability_law_ends_in_an_error_and_the_last_good_state() {
     value["adaptive_time_step"] = false.into();
     value["time_step"] = (0.3 / 24.0).into();
     let mut simulation =
-        Simulation::new(common::parse(&value), taylor_green(24, 0.1), Clock::default(), Some(2)).expect("valid");
+        Simulation::new(common::parse(&value), common::taylor_green(24, 0.1), Clock::default(), Some(2)).expect("valid");
     let mut good = bits(simulation.particles());
     let error = loop {
         match simulation.advance(1, None) {
@@ -478,12 +469,12 @@ fn breakdown(value: &serde_json::Value, particles: Particles<2>) -> (&'static st
 fn each_kind_of_breakdown_is_named_with_its_likely_cause() {
     let mut value = common::settings_value::<2>(1.0 / 24.0, "periodic");
     value["velocity_limit"] = 0.5.into();
-    let (field, message) = breakdown(&value, taylor_green(24, 0.1));
+    let (field, message) = breakdown(&value, common::taylor_green(24, 0.1));
     assert!(field == "velocity" && message.contains("in the open flow"), "{message}");
 
     // A particle alone in a large hole.
     let mut value = common::settings_value::<2>(1.0 / 24.0, "periodic");
-    let mut hollow = taylor_green(24, 0.0);
+    let mut hollow = common::taylor_green(24, 0.0);
     let centre = Vector::from([0.52, 0.52]);
     let distance: Vec<f64> = hollow.position.iter().map(|r| (r - centre).norm()).collect();
     let nearest = distance.iter().copied().fold(f64::INFINITY, f64::min);
@@ -500,7 +491,7 @@ fn each_kind_of_breakdown_is_named_with_its_likely_cause() {
 
     // One that flies through a side without a wall.
     value["domain"]["boundaries"] = json!([["none", "none"], ["periodic", "periodic"]]);
-    let mut leaving = taylor_green(24, 0.0);
+    let mut leaving = common::taylor_green(24, 0.0);
     leaving.position[0][0] = -0.2;
     let (field, message) = breakdown(&value, leaving);
     assert!(field == "position" && message.contains("through a wall"), "{message}");
@@ -524,7 +515,7 @@ fn each_kind_of_breakdown_is_named_with_its_likely_cause() {
 
     value["kinematic_viscosity"] = 1e300.into();
     value["adaptive_time_step"] = false.into();
-    let (_, message) = breakdown(&value, taylor_green(24, 0.1));
+    let (_, message) = breakdown(&value, common::taylor_green(24, 0.1));
     assert!(message.contains("times the viscous limit"), "{message}");
 }
 
@@ -533,7 +524,8 @@ fn looking_at_the_flow_changes_no_bit_of_it() {
     for algorithm in ALGORITHMS {
         let run = |looks: bool| {
             let settings = with_algorithm(common::settings_value::<2>(1.0 / 24.0, "periodic"), algorithm);
-            let mut simulation = Simulation::new(settings, taylor_green(24, 0.1), Clock::default(), Some(2)).expect("valid");
+            let mut simulation =
+                Simulation::new(settings, common::taylor_green(24, 0.1), Clock::default(), Some(2)).expect("valid");
             for _ in 0..34 {
                 if looks {
                     simulation.snapshot();
@@ -620,7 +612,7 @@ fn the_adaptive_step_obeys_the_stability_law_and_the_user() {
     value["time_step"] = 0.02.into();
     let settings = common::parse(&value);
     let law = settings.time_step_limits(1.0, settings.largest_eigenvalues()).penalty;
-    let mut simulation = Simulation::new(settings, taylor_green(24, 0.0), Clock::default(), Some(2)).expect("valid");
+    let mut simulation = Simulation::new(settings, common::taylor_green(24, 0.0), Clock::default(), Some(2)).expect("valid");
     simulation.advance(20, None).expect("stable");
     for report in simulation.take_history() {
         assert_relative_eq!(report.time_step * report.velocity_max, 0.9 * law, max_relative = 1e-12);
@@ -628,7 +620,7 @@ fn the_adaptive_step_obeys_the_stability_law_and_the_user() {
     value["adaptive_until"] = 0.01.into();
     value["time_step"] = law.into();
     let mut simulation =
-        Simulation::new(common::parse(&value), taylor_green(24, 0.0), Clock::default(), Some(2)).expect("valid");
+        Simulation::new(common::parse(&value), common::taylor_green(24, 0.0), Clock::default(), Some(2)).expect("valid");
     simulation.advance(5, None).expect("the law holds");
     for report in simulation.take_history() {
         let free = report.clock.time - report.time_step >= 0.01;

@@ -35,7 +35,7 @@ fn shifts(settings: &Settings, time_step: f64) -> (Set<2>, Vec<Vector<2>>) {
 #[test]
 fn the_shift_goes_with_the_xsph_velocity_the_strain_or_the_largest_velocity() {
     let mut settings = common::settings::<2>(1.0 / SIDE as f64, "none");
-    let kernel = Smoothing::<QuinticSpline>::new(settings.smoothing_length(), 2);
+    let kernel = Smoothing::new(QuinticSpline, settings.smoothing_length(), 2);
     let time_step = 1e-4;
     let mut strained = 0;
     for shifting in [Shifting::Xsph, Shifting::Strain, Shifting::MaximumVelocity] {

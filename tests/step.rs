@@ -525,7 +525,7 @@ fn averages<const N: usize>(
     value: impl Fn(usize, Vector<2>) -> Vector<N>,
 ) -> Vec<Option<Vector<N>>> {
     let Particles { kind, real, .. } = &set.particles;
-    let smoothing = Smoothing::<QuinticSpline>::new(settings.smoothing_length(), 2);
+    let smoothing = Smoothing::new(QuinticSpline, settings.smoothing_length(), 2);
     let position = &set.frame.stencil.position;
     let average = |s: usize| {
         let mut sums = (0.0, Vector::zeros());

@@ -91,8 +91,8 @@ pub fn for_each_weighted<const D: usize>(
     near: impl Iterator<Item = (Entry, f64)>,
     mut f: impl FnMut(usize, f64, Vector<D>),
 ) {
-    with_kernel!(settings.kernel, K => {
-        let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
+    with_kernel!(settings.kernel, kernel => {
+        let kernel = Smoothing::new(kernel, settings.smoothing_length(), D);
         for (entry, share) in near {
             let r_ij = stencil.position[i] - stencil.position[entry.j()];
             let weight = share * kernel.value(r_ij.norm());

@@ -65,8 +65,8 @@ pub fn surface_area<const D: usize>(settings: &Settings, particles: &Particles<D
     let above = |a: usize| stencil.position[a] + normal[a] * depth[a];
     // The other side of a plate may be as near as the next particle.
     let near = stencil.solids_near(settings, s).filter(|&a| normal[a].dot(&normal[s]) > -SAME_WALL);
-    with_kernel!(settings.kernel, K => {
-        let kernel = Smoothing::<K>::new(settings.smoothing_length(), D - 1);
+    with_kernel!(settings.kernel, kernel => {
+        let kernel = Smoothing::new(kernel, settings.smoothing_length(), D - 1);
         weight(s) / near.map(|a| weight(a) * kernel.value((above(s) - above(a)).norm())).sum::<f64>()
     })
 }

@@ -41,8 +41,8 @@ impl<const D: usize> Stencil<D> {
         // The slopes first hold the nominal volume Δx^D in the place of V_j, lest f32 overflow in small units.
         let nominal = settings.particle_spacing.powi(D as i32);
         let outputs = (&mut self.volume[..real], &mut nothing(real)[..], &mut nothing(real)[..]);
-        with_kernel!(settings.kernel, K => {
-            let kernel = Smoothing::<K>::new(settings.smoothing_length(), D);
+        with_kernel!(settings.kernel, kernel => {
+            let kernel = Smoothing::new(kernel, settings.smoothing_length(), D);
             self.neighbours.for_each_mut(outputs, Volumes { kernel, position, nominal });
         });
         mirror(&mut self.volume);
@@ -246,7 +246,8 @@ impl<K: Kernel, const D: usize> Volumes<'_, K, D> {
     #[inline(always)]
     fn sum<V: Lanes, const SHARED: bool>(&self, cluster: Cluster, row: RowMut<'_>) -> V {
         let here: [V; D] = cluster.vectors(self.position);
-        let (value_factor, slope_factor) = self.kernel.factors();
+        let kernel = self.kernel;
+        let (value_factor, slope_factor) = kernel.factors();
         let slope_factor = slope_factor * self.nominal;
         let mut sum = V::zero();
         let mut number = 0;
@@ -255,11 +256,11 @@ impl<K: Kernel, const D: usize> Volumes<'_, K, D> {
         for block in row.entries.chunks_mut(BLOCK) {
             for (square, entry) in squares.iter_mut().zip(&*block) {
                 let r_ij = from(here, &self.position[entry.j()]);
-                *square = self.kernel.ratio_squared(norm_squared(r_ij)).store_single();
+                *square = kernel.ratio_squared(norm_squared(r_ij)).store_single();
             }
             for (two, squares) in block.chunks_mut(2).zip(squares.as_chunks().0) {
                 // An odd last entry comes with the square of another, not used.
-                let (values, slopes) = Smoothing::<K>::value_and_slope(V::load_singles(squares), slope_factor);
+                let (values, slopes) = kernel.value_and_slope(V::load_singles(squares), slope_factor);
                 let (values, slopes) = (V::split(values), V::store_singles(slopes));
                 for (k, entry) in two.iter_mut().enumerate() {
                     entry.slopes = slopes[k];

@@ -1,5 +1,6 @@
 //! The domain, its sides, and the bodies in it.
 
+use crate::base::error::{Result, setting};
 use serde::{Deserialize, Serialize};
 
 /// What closes one side of the domain.
@@ -33,4 +34,45 @@ pub struct Body {
     pub moves: bool,
     /// Point that the torque is taken about. It stays where it is when the body moves.
     pub center: Vec<f64>,
+}
+
+impl Domain {
+    /// Refuse one that is no box of `dimensions`, or whose sides do not leave room for a kernel of `support_radius`.
+    pub(super) fn validate(&self, dimensions: usize, support_radius: f64) -> Result<()> {
+        let Self { lower, upper, boundaries } = self;
+        validate_vector("domain.lower", lower, dimensions)?;
+        validate_vector("domain.upper", upper, dimensions)?;
+        if boundaries.len() != dimensions {
+            return Err(setting("domain.boundaries", format!("must have {dimensions} pairs, one a direction")));
+        }
+        for (axis, pair) in boundaries.iter().enumerate() {
+            if upper[axis] - lower[axis] < support_radius {
+                let problem = format!("direction {axis} is shorter than the support radius {support_radius}");
+                return Err(setting("domain", problem));
+            }
+            if (pair[0] == Boundary::Periodic) != (pair[1] == Boundary::Periodic) {
+                return Err(setting("domain.boundaries", format!("direction {axis} is periodic on one side only")));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Refuse bodies that have the same name, or vectors that are not of `dimensions`.
+pub(super) fn validate_bodies(bodies: &[Body], dimensions: usize) -> Result<()> {
+    for (k, body) in bodies.iter().enumerate() {
+        if bodies[..k].iter().any(|other| other.name == body.name) {
+            return Err(setting("bodies", format!("two are named \"{}\"; names must differ", body.name)));
+        }
+        validate_vector(&format!("bodies.{}.velocity", body.name), &body.velocity, dimensions)?;
+        validate_vector(&format!("bodies.{}.center", body.name), &body.center, dimensions)?;
+    }
+    Ok(())
+}
+
+pub(super) fn validate_vector(name: &str, vector: &[f64], dimensions: usize) -> Result<()> {
+    if vector.len() != dimensions || !vector.iter().all(|x| x.is_finite()) {
+        return Err(setting(name, format!("must be {dimensions} finite numbers, not {vector:?}")));
+    }
+    Ok(())
 }

@@ -50,8 +50,8 @@ impl Settings {
     /// V_j |∇W|/r, negative, at the points of the unit lattice around the origin, and tr α.
     fn lattice_slopes(&self) -> (Vec<([f64; 3], f64)>, f64) {
         let (ratio, dimensions) = (self.smoothing_ratio, self.dimensions);
-        let weights = with_kernel!(self.kernel, K => {
-            let smoothing = Smoothing::<K>::new(ratio, dimensions);
+        let weights = with_kernel!(self.kernel, kernel => {
+            let smoothing = Smoothing::new(kernel, ratio, dimensions);
             lattice(dimensions, self.kernel.support() * ratio)
                 .map(|r| {
                     let distance = r.iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -9,7 +9,6 @@ mod domain;
 mod lattice;
 mod limits;
 mod rules;
-mod validation;
 
 pub use domain::{Body, Boundary, Domain};
 pub use lattice::Eigenvalues;
@@ -18,6 +17,9 @@ pub use rules::{
     DensityDiffusion, DerivativeFrame, SchemeSettings, Shifting, SweepPressure, SweepWeights, VelocityLaplacian,
     WallPressure, WallVelocity,
 };
+
+/// Iterations or sweeps of a step above which a number is a mistake: a step cannot be interrupted.
+const MOST_PASSES: f64 = 1000.0;
 
 /// All that governs a simulation beside its particles. Any consistent units.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -116,5 +118,79 @@ impl Settings {
         let margin = self.buffer_length() + 4.0 * self.support_radius();
         let corner = |corner: &[f64], outward| Vector::from_fn(|axis, _| corner[axis] + outward * margin);
         (corner(&self.domain.lower, -1.0), corner(&self.domain.upper, 1.0))
+    }
+
+    /// Refuse settings that cannot be computed with.
+    pub fn validate(&self) -> Result<()> {
+        if !(2..=3).contains(&self.dimensions) {
+            return Err(setting("dimensions", format!("must be 2 or 3, not {}", self.dimensions)));
+        }
+        if ![2, 4].contains(&self.viscous_order) {
+            return Err(setting("viscous_order", format!("must be 2 or 4, not {}", self.viscous_order)));
+        }
+        let positive = [
+            ("particle_spacing", self.particle_spacing),
+            ("smoothing_ratio", self.smoothing_ratio),
+            ("density", self.density),
+            ("time_step", self.time_step),
+            ("courant", self.courant.unwrap_or(1.0)),
+            ("time_step_safety", self.time_step_safety),
+            ("divergence_tolerance", self.divergence_tolerance),
+            ("shift_limit", self.shift_limit),
+            ("velocity_limit", self.velocity_limit.unwrap_or(1.0)),
+        ];
+        for (name, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(setting(name, format!("must be a positive number, not {value}")));
+            }
+        }
+        for (name, value) in
+            [("kinematic_viscosity", self.kinematic_viscosity), ("shift_coefficient", self.shift_coefficient)]
+        {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(setting(name, format!("must be a number not below zero, not {value}")));
+            }
+        }
+        let ranges = [
+            ("smoothing_ratio", self.smoothing_ratio, 0.8, 3.0),
+            ("penalty_constant", self.penalty_constant.unwrap_or(1.0), 1.0, 100.0),
+            ("viscous_theta", self.viscous_theta, 0.5, 1.0),
+            ("max_iterations", self.max_iterations as f64, 1.0, MOST_PASSES),
+            ("projection_sweeps", self.projection_sweeps as f64, 0.0, MOST_PASSES),
+        ];
+        for (name, value, lowest, highest) in ranges {
+            if !(lowest..=highest).contains(&value) {
+                return Err(setting(name, format!("must lie in {lowest}..{highest}, not {value}")));
+            }
+        }
+        if self.search_every_iteration && self.derivative_frame != DerivativeFrame::Updated {
+            return Err(setting("search_every_iteration", "needs derivative_frame = \"updated\""));
+        }
+        self.kernel.validate(self.dimensions)?;
+        self.validate_scheme()?;
+        domain::validate_vector("body_force", &self.body_force, self.dimensions)?;
+        domain::validate_bodies(&self.bodies, self.dimensions)?;
+        self.domain.validate(self.dimensions, self.support_radius())
+    }
+
+    fn validate_scheme(&self) -> Result<()> {
+        let (sound_speed, coefficient) = match self.scheme {
+            SchemeSettings::Alsph => return Ok(()),
+            SchemeSettings::Wcsph { sound_speed, diffusion_coefficient, .. }
+            | SchemeSettings::Edac { sound_speed, diffusion_coefficient } => (sound_speed, diffusion_coefficient),
+        };
+        if !(sound_speed.is_finite() && sound_speed > 0.0) {
+            return Err(setting("scheme.sound_speed", format!("must be a positive number, not {sound_speed}")));
+        }
+        if !(0.0..=1.0).contains(&coefficient) {
+            return Err(setting("scheme.diffusion_coefficient", format!("must lie in 0..1, not {coefficient}")));
+        }
+        if self.velocity_laplacian == VelocityLaplacian::Vector {
+            return Err(setting("velocity_laplacian", "must be \"scalar\" but in the scheme alsph"));
+        }
+        if self.wall_pressure == WallPressure::Paper {
+            return Err(setting("wall_pressure", "must be \"linear\" or \"adami\" but in the scheme alsph"));
+        }
+        Ok(())
     }
 }

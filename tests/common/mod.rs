@@ -43,6 +43,17 @@ pub fn parse(value: &Value) -> Settings {
     Settings::from_json(&value.to_string()).expect("valid settings")
 }
 
+/// Taylor-Green: u = −U e^{−8π²νt} cos 2πx sin 2πy, v = U e^{−8π²νt} sin 2πx cos 2πy in the unit square.
+pub fn taylor_green(side: usize, disorder: f64) -> Particles<2> {
+    let mut particles = particles(lattice::<2>(side, disorder));
+    for i in 0..particles.real {
+        let [x, y] = [0, 1].map(|k| 2.0 * PI * particles.position[i][k]);
+        particles.velocity[i] = Vector::from([-x.cos() * y.sin(), x.sin() * y.cos()]);
+        particles.pressure[i] = -0.25 * ((2.0 * x).cos() + (2.0 * y).cos());
+    }
+    particles
+}
+
 /// Fluid at rest at `points`.
 pub fn particles<const D: usize>(points: Vec<Vector<D>>) -> Particles<D> {
     let count = points.len();

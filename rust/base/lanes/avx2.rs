@@ -39,6 +39,11 @@ impl Real for Avx2 {
     fn plus_product(self, a: Self, b: Self) -> Self {
         Self(unsafe { _mm256_fmadd_pd(a.0, b.0, self.0) })
     }
+
+    #[inline(always)]
+    fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        Self::load(&self.store().map(f))
+    }
 }
 
 impl Real for Singles {
@@ -60,6 +65,11 @@ impl Real for Singles {
     #[inline(always)]
     fn plus_product(self, a: Self, b: Self) -> Self {
         Self(unsafe { _mm256_fmadd_ps(a.0, b.0, self.0) })
+    }
+
+    #[inline(always)]
+    fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        Avx2::load_singles(&Avx2::store_singles(self).map(|values| values.map(|value| f(value.into()) as f32)))
     }
 }
 

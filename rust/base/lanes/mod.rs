@@ -28,6 +28,8 @@ pub trait Real:
     fn positive(self) -> Self;
     /// `self + a b`. Lanes round once, after the sum.
     fn plus_product(self, a: Self, b: Self) -> Self;
+    /// `f` of each number, one at a time.
+    fn map(self, f: impl Fn(f64) -> f64) -> Self;
 
     #[inline(always)]
     fn zero() -> Self {
@@ -142,6 +144,11 @@ impl Real for f64 {
     fn plus_product(self, a: Self, b: Self) -> Self {
         // Fused it would be a call on most machines.
         self + a * b
+    }
+
+    #[inline(always)]
+    fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        f(self)
     }
 }
 

@@ -40,6 +40,11 @@ macro_rules! portable {
             fn plus_product(self, a: Self, b: Self) -> Self {
                 Self(std::array::from_fn(|lane| a.0[lane].mul_add(b.0[lane], self.0[lane])))
             }
+
+            #[inline(always)]
+            fn map(self, f: impl Fn(f64) -> f64) -> Self {
+                Self(self.0.map(|value| f(value.into()) as $number))
+            }
         }
 
         arithmetic!(
