@@ -1,7 +1,12 @@
 """The loads that a run records are those of the flow: the momentum balance of boxes around the body gives the same."""
 
+from pathlib import Path
+
 import pytest
-from balance import body, loads
+from alsph import cases
+from balance import CHANNEL, body, loads
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 @pytest.mark.parametrize(
@@ -18,3 +23,14 @@ def test_recorded_loads_are_the_momentum_that_the_flow_loses(shape, options, sta
     found = loads(body(shape, **options), start, until)
     largest = abs(found.boxes).max()
     assert found.recorded == pytest.approx(found.boxes, abs=tolerance * largest), (found.recorded, found.spread)
+
+
+def test_so_are_those_on_the_array_of_the_examples():
+    array = cases.find("cylinder_array.py", EXAMPLES)
+    channel = CHANNEL | {"height": 6.0, "resolution": 16}
+    found = loads(array(**channel), 0.5, 1.25)
+    assert found.recorded == pytest.approx(found.boxes, abs=0.03 * abs(found.boxes).max()), (
+        found.recorded,
+        found.spread,
+    )
+    assert found.largest_lift < 1e-5

@@ -1,5 +1,6 @@
-"""A case of another package: in the command line, in files and studies, in run folders, and what is wrong with one."""
+"""A case of another package or of a file: in the command line, in studies, in run folders; what is wrong with one."""
 
+import functools
 import os
 import subprocess
 import sys
@@ -69,20 +70,85 @@ def command(tmp_path):
     return run
 
 
-def test_a_case_of_another_package_is_one_of_alsphs(command, tmp_path):
+def test_a_case_of_another_package_is_listed(command):
     assert "heated" in command("cases").stdout
-    assert "how hot it is" in command("run", "heated", "--help").stdout
-    run = command("run", "heated", "--resolution", 8, "--heat", 2, "--until", 0.02, "-o", "run")
+
+
+@pytest.mark.parametrize(
+    ("name", "recorded"),
+    [
+        ("heated", 'case = "heated"'),
+        ("mine/my_cases.py", 'file = "my_cases.py"\nname = "Heated"'),
+        ("mine/my_cases.py:Heated", 'file = "my_cases.py"\nname = "Heated"'),
+    ],
+)
+def test_a_case_of_anothers_is_one_of_alsphs(command, tmp_path, name, recorded):
+    packages = ("heated = my_package:Heated",) if name == "heated" else ()
+    command = functools.partial(command, cases=packages)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "my_cases.py").write_text(HEATED)
+    assert "how hot it is" in command("run", name, "--help").stdout
+    run = command("run", name, "--resolution", 8, "--heat", 2, "--until", 0.02, "-o", "run")
     assert run.returncode == 0, run.stderr
-    assert 'case = "heated"' in (tmp_path / "run" / "case.toml").read_text()
+    assert recorded in (tmp_path / "run" / "case.toml").read_text()
+    (tmp_path / "heat.toml").write_text(STUDY.replace('"heated"', f'"{name}"'))
+    study = command("study", "heat.toml", "--jobs", 1)
+    assert study.returncode == 0, study.stdout + study.stderr
+    other = command("run", name, "--resolution", 8, "--heat", 2, "--until", 0.02, "--initial-run", "run", "-o", "other")
+    assert other.returncode == 0 and "another flow" not in other.stderr, other.stderr
+    (tmp_path / "mine" / "my_cases.py").unlink()  # the run folder holds what was run
     resumed = command("resume", "run", "--until", 0.04)
     assert resumed.returncode == 0 and "finished" in command("info", "run").stdout, resumed.stderr
     assert "the same to the last bit" in command("repeat", "run").stdout
     (tmp_path / "again.toml").write_text((tmp_path / "run" / "case.toml").read_text())
     assert command("describe", "again.toml", "--no-probe").returncode == 0
-    (tmp_path / "heat.toml").write_text(STUDY)
-    study = command("study", "heat.toml", "--jobs", 1)
-    assert study.returncode == 0, study.stdout + study.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "told"),
+    [
+        (None, "", "my_cases.py: cannot be read (No such file or directory)"),
+        (HEATED, ":Hot", "my_cases.py: has no case 'Hot'; known: Heated"),
+        (HEATED, ":Stranger", "my_cases.py: has no case 'Stranger'"),
+        ("x = (", "", "my_cases.py: line 1: '(' was never closed"),
+        ("import math\n\nmath.sqrt(-1)\n", "", "my_cases.py: line 3: ValueError: "),
+        ("import nothing_like_it\n", "", "my_cases.py: line 1: ModuleNotFoundError: No module named 'nothing_like_it'"),
+        (
+            "from alsph.cases import Bodies\n",
+            "",
+            "my_cases.py: has no case, a class that derives",
+        ),
+        ("from alsph.cases import Bodies\nclass Half(Bodies): ...\n", "", "my_cases.py: Half lacks shapes"),
+        (HEATED + "class Other(Heated): ...\n", "", "has the cases Heated, Other; say which, as my_cases.py:Heated"),
+        (HEATED.replace('"heated"', '"he/ated"'), "", "may hold letters, digits, _ and - only"),
+        (HEATED.replace('"heated"', '"cylinder"'), "", "its name, 'cylinder', is that of a case which is there"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_told(command, tmp_path, text, name, told):
+    if text is not None:
+        (tmp_path / "my_cases.py").write_text(text)
+    done = command("run", f"my_cases.py{name}", "--resolution", 8, cases=())
+    assert done.returncode == 2 and told in done.stderr, done.stderr
+    assert "Traceback" not in done.stderr and not (tmp_path / "runs").exists()
+
+
+def test_a_file_may_import_what_lies_beside_it(command, tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "helper.py").write_text("")
+    (tmp_path / "mine" / "my_cases.py").write_text("import helper" + HEATED)
+    run = command("run", "mine/my_cases.py", "--resolution", 8, "--until", 0.02, "-o", "run", cases=())
+    assert run.returncode == 0, run.stderr
+    done = command("info", "run", cases=())
+    assert "No module named 'helper'; a run folder holds my_cases.py alone: set PYTHONPATH to where" in done.stderr
+
+
+def test_a_run_folder_whose_case_was_changed_is_refused(command, tmp_path):
+    (tmp_path / "my_cases.py").write_text(HEATED)
+    command("run", "my_cases.py", "--resolution", 8, "--until", 0.02, "-o", "run", cases=())
+    path = tmp_path / "run" / "case.toml"
+    path.write_text(path.read_text().replace("spin faster", "spin slower"))
+    done = command("resume", "run", "--until", 0.04, cases=())
+    assert done.returncode == 2 and "my_cases.py: the text is not that which its sha256 is of" in done.stderr
 
 
 @pytest.mark.parametrize(

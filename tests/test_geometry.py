@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 import shapely
-from alsph.cases.body import _naca0012
 from alsph.geometry import thin
 from alsph.geometry.lattice import cells, inside
+from alsph.geometry.naca import naca
 from alsph.geometry.solids import body_layers, cylinder_rings, walls
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,7 +14,7 @@ SHAPES = {
     "circle": shapely.Polygon(0.5 * np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)),
     "ellipse": shapely.Polygon(np.stack([0.5 * np.cos(ANGLES), 0.2 * np.sin(ANGLES)], axis=1)),
     "square": shapely.box(-0.5, -0.5, 0.5, 0.5),
-    "airfoil": shapely.Polygon(_naca0012()),
+    "airfoil": naca("0012"),
     "wedge": shapely.Polygon([(0, 0), (1, 0.2), (1, -0.2)]),
     "bracket": shapely.box(-0.5, -0.5, 0.5, 0.5) - shapely.box(-0.2, -0.2, 0.6, 0.2),
 }

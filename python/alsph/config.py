@@ -78,7 +78,7 @@ class Config:
         """Return the same without the settings of the run."""
         values = self.case.model_dump(include=set(self.case.parameter_names()))
         values = {name: values[name] for name in self.case.parameter_names()}
-        return {"case": self.case.name} | {name: value for name, value in values.items() if value is not None}
+        return {"case": self.case.reference()} | {name: value for name, value in values.items() if value is not None}
 
     def text(self) -> str:
         """Return the configuration with all its parameters as TOML."""
@@ -97,7 +97,8 @@ def from_tables(tables: dict[str, Any], *folders: Path) -> Config:
     tables
         The tables.
     *folders
-        Folders that the path of an outline or an initial run in them may start from; the present one if none is given.
+        Folders that the path of an outline, a case's file or an initial run in them may start from; the present one if
+        none is given.
 
     Raises
     ------
@@ -106,16 +107,16 @@ def from_tables(tables: dict[str, Any], *folders: Path) -> Config:
     """
     parameters = dict(tables)
     name, run = parameters.pop("case", None), parameters.pop("run", {})
-    if not isinstance(name, str):
+    if not isinstance(name, str | dict):
         raise ConfigError('case: missing, or not a string; add for instance case = "cylinder"')
     if not isinstance(run, dict):
         raise ConfigError(f"run = {shown(run)}: must be a table, [run]")
     shape = parameters.get("shape")
-    if isinstance(shape, str) and shape not in cases.body.SHAPES:
+    if isinstance(shape, str) and not cases.body.is_name(shape):
         parameters["shape"] = _found(shape, folders)
     if isinstance(initial_run := run.get("initial_run"), str):
         run = run | {"initial_run": _found(initial_run, (*folders, Path()))}
-    model = cases.find(name)
+    model = cases.find(name, *folders)
     _check_places(model, parameters, run)
     mistakes: list[str] = []
     case, settings = _made(model, parameters, "", mistakes), _made(RunSettings, run, "run.", mistakes)

@@ -51,6 +51,9 @@ class Record(Protocol):
     def lift(self) -> Load:
         """Lift coefficient."""
 
+    def load(self, axis: str, body: str | None = None) -> Load:
+        """Force coefficient of a body along an axis."""
+
     def moment(self) -> Load:
         """Pitching moment coefficient."""
 

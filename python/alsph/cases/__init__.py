@@ -5,16 +5,22 @@ A package adds a case by an entry point of the group ``alsph.cases``, with the n
     [project.entry-points."alsph.cases"]  # in its pyproject.toml
     heated = "my_package.heated:Heated"
 
-Then it is in the command line, in files, studies and run folders as any other.
+Then it is in the command line, in files, studies and run folders as any other. So is, without a package, the class
+``Heated`` of a file ``my_cases.py`` under the name ``my_cases.py:Heated`` (:mod:`alsph.cases.source`).
 """
 
 import warnings
 from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
 
+from alsph.cases import source
 from alsph.cases.backward_facing_step import BackwardFacingStep
 from alsph.cases.base import Case
+from alsph.cases.bodies import Bodies
 from alsph.cases.body import Body
 from alsph.cases.cavity import Cavity
+from alsph.cases.channel import Channel
 from alsph.cases.couette import Couette
 from alsph.cases.cylinder import Cylinder
 from alsph.cases.poiseuille import Poiseuille
@@ -31,9 +37,11 @@ CASES: dict[str, type[Case]] = {
 __all__ = [
     "CASES",
     "BackwardFacingStep",
+    "Bodies",
     "Body",
     "Case",
     "Cavity",
+    "Channel",
     "Couette",
     "Cylinder",
     "Poiseuille",
@@ -59,15 +67,30 @@ def _add_installed() -> None:
 _add_installed()
 
 
-def find(name: str) -> type[Case]:
-    """Return the case with that name.
+def find(name: str | dict[str, Any], *folders: Path) -> type[Case]:
+    """Return a case.
+
+    Parameters
+    ----------
+    name
+        Its name, ``FILE.py:CLASS`` or, from a run folder, the fields of :class:`alsph.cases.source.Source`.
+    *folders
+        Where the path of the file may start from; the present folder if none is given.
 
     Raises
     ------
     ConfigError
-        If there is none.
+        If there is none, or its file cannot be run.
     """
+    if isinstance(name, dict) or source.is_reference(name):
+        model = source.Source(**name).model() if isinstance(name, dict) else source.read(name, *folders)
+        if model.name in CASES:
+            raise ConfigError(
+                f"{source.shown_name(model.reference())}: its name, '{model.name}', is that of a case which is there; "
+                "give it one of its own"
+            )
+        return model
     if name not in CASES:
-        own = "a case of your own must be put into alsph.cases.CASES before, or be an entry point of its package"
+        own = "a case of your own is FILE.py:CLASS, an entry point of its package, or put into alsph.cases.CASES before"
         raise ConfigError(f"unknown case '{name}'; {suggest(name, CASES)} ({own})")
     return CASES[name]

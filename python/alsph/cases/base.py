@@ -26,6 +26,7 @@ from alsph.geometry.surface import Surface
 from alsph.memory import check
 
 if TYPE_CHECKING:
+    from alsph.cases.source import Source
     from alsph.results.run import Run
 
 VELOCITY_LIMIT = 50.0
@@ -49,6 +50,8 @@ class Case(Method):
     """Parameters of the case that nothing but its own start depends on."""
     later_names: ClassVar[tuple[str, ...]] = ()
     """Measures and profiles, or beginnings of their names, that only a run with some results has."""
+    code: ClassVar[Source | None] = None
+    """The Python file of the user's that it stands in."""
 
     reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, ge=8, description="particles per reference length, D/Δx [-]")
@@ -57,6 +60,12 @@ class Case(Method):
     def parameter_names(cls) -> list[str]:
         """Return the names of the parameters, those of the problem before those of the numerical method."""
         return sorted(cls.model_fields, key=lambda name: name in Method.model_fields)
+
+    @classmethod
+    def reference(cls) -> str | dict[str, Any]:
+        """Return what stands for the case in a configuration: its name, or the file of the user's that it stands in."""
+        code = vars(cls).get("code")
+        return code.model_dump() if code else cls.name
 
     @property
     @abstractmethod

@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 import shapely
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 from shapely import affinity
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
-from alsph.cases import remarks
-from alsph.cases.channel import Channel
-from alsph.cases.remarks import TOO_THIN
-from alsph.errors import ConfigError
+from alsph.cases.bodies import Bodies
+from alsph.geometry.naca import NAME, naca
 from alsph.geometry.outline import Outline
-from alsph.geometry.packing import pack
-from alsph.geometry.solids import Solid
 from alsph.geometry.surface import Surface, along, edges
-from alsph.geometry.thin import carried, solid
 
 
-class Body(Channel):
+class Body(Bodies):
     """Flow past a body of any shape in a channel with free-slip walls and uniform inflow U.
 
     D is the side of the square, the chord of the airfoil, or the unit of the file's lengths. A file holds points, two
@@ -43,115 +37,36 @@ class Body(Channel):
 
     shape: str | Outline = Field(
         default="square_cylinder",
-        description="square_cylinder, naca0012, or a text file of points: one or several closed curves, lengths in D; "
-        "in Python also arrays of points or shapely's polygons",
+        description="square_cylinder, a NACA airfoil of four or five digits, such as naca0012, or a text file of "
+        "points: one or several closed curves, lengths in D; in Python also arrays of points or shapely's polygons",
     )
     angle_of_attack: float = Field(default=0.0, ge=-180, le=180, description="angle of attack, nose up [degrees]")
 
     @field_validator("shape", mode="before")
     @classmethod
     def _read(cls, shape: Any) -> str | Outline:
-        if isinstance(shape, str) and shape in SHAPES:
+        if isinstance(shape, str) and is_name(shape):
+            named(shape)
             return shape
         if isinstance(shape, dict):
             return Outline(**shape)
         if isinstance(shape, str | os.PathLike):
             if not os.path.exists(shape):
-                raise ValueError(f"neither {' nor '.join(SHAPES)} nor a file that is there")
+                raise ValueError("neither square_cylinder nor a NACA airfoil (naca0012) nor a file that is there")
             return Outline.read(shape)
         return shape if isinstance(shape, Outline) else Outline.of(shape)
 
-    @model_validator(mode="after")
-    def _fits_in(self) -> Self:
-        left, bottom, right, top = self.outline.bounds
-        room = min(
-            self.upstream + left, self.length - self.upstream - right, bottom + self.height / 2, self.height / 2 - top
-        )
-        if room < 0.5:
-            raise ValueError(
-                f"the body, {right - left:.3g} D long and {top - bottom:.3g} D high, comes within {room:.3g} D of a "
-                "side of the channel; leave at least 0.5 D"
-            )
-        return self
+    def shapes(self) -> list[shapely.Polygon]:
+        """Return the bodies, their centroid at the origin, turned by the angle of attack."""
+        return list(shapely.get_parts(self.outline))
 
     @cached_property
     def outline(self) -> shapely.Polygon | shapely.MultiPolygon:
         """The body, or all bodies together, their centroid at the origin, turned by the angle of attack."""
-        polygons = [SHAPES[self.shape]()] if isinstance(self.shape, str) else self.shape.polygons
+        polygons = [named(self.shape)] if isinstance(self.shape, str) else self.shape.polygons
         outline = polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
         centred = affinity.translate(outline, -outline.centroid.x, -outline.centroid.y)
         return affinity.rotate(centred, -self.angle_of_attack, origin=(0, 0))
-
-    @property
-    def outlines(self) -> list[shapely.Polygon]:
-        """The single bodies of :attr:`outline`."""
-        return list(shapely.get_parts(self.outline))
-
-    @property
-    def thickness(self) -> float:
-        """Extent of the bodies across the stream [D]."""
-        _, bottom, _, top = self.bounds
-        return top - bottom
-
-    @cached_property
-    def carried(self) -> list[shapely.Polygon | shapely.MultiPolygon]:
-        """The single bodies without what is too thin for the resolution."""
-        return [carried(outline, self.particle_spacing) for outline in self.outlines]
-
-    @property
-    def coefficient_bodies(self) -> list[str]:
-        """``body``, or ``body_1``, ``body_2``, ... where there are several."""
-        count = len(self.outlines)
-        return ["body"] if count == 1 else [f"body_{number}" for number in range(1, count + 1)]
-
-    @cached_property
-    def _solids(self) -> list[Solid]:
-        if too_thin := [remark for remark in self.remarks() if remark.startswith(TOO_THIN)]:
-            raise ConfigError(too_thin[0])
-        return [solid(outline, self.particle_spacing, self.support_layers) for outline in self.carried]
-
-    def solids(self) -> list[Solid]:
-        """Return layers along the surface of each body, with two faces where it is thin.
-
-        Raises
-        ------
-        ConfigError
-            If a body is too thin for the resolution.
-        """
-        return self._solids
-
-    def fluid(self, cells: FloatArray) -> FloatArray:
-        """Return fluid evenly spaced around the bodies, as much as they leave of the cells."""
-        position = np.concatenate([solid.position for solid in self._solids])
-        bodies = shapely.union_all(self.carried)
-        return np.asarray(self.centre + pack(cells - self.centre, bodies, position, self.particle_spacing))
-
-    @property
-    def bounds(self) -> tuple[float, float, float, float]:
-        """Left, bottom, right and top of the outline, relative to its centroid [D]."""
-        left, bottom, right, top = self.outline.bounds
-        return left, bottom, right, top
-
-    @property
-    def size(self) -> float:
-        """Larger extent of the body, of the smallest one if there are several [D]."""
-        lower, upper = np.split(shapely.bounds(shapely.get_parts(self.outline)), 2, axis=1)
-        return float((upper - lower).max(axis=1).min())
-
-    def scales(self) -> dict[str, float]:
-        """Return those of the flow and the thickness of the body's thinnest part."""
-        thinnest = remarks.thinnest(self.outline) / self.particle_spacing
-        return super().scales() | {"thickness of the thinnest part, Δx": thinnest}
-
-    def remarks(self) -> list[str]:
-        """Return what is to be said of the resolution, the method, the channel and parts of the body."""
-        unknown = "not validated: flow past this body; it has not been compared with the results of others"
-        thin = [
-            remark
-            for name, outline, left in zip(self.coefficient_bodies, self.outlines, self.carried, strict=True)
-            for remark in remarks.thin(name, outline, left, self.particle_spacing)
-        ]
-        return [*super().remarks(), *thin, unknown]
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces, among them what a body at an angle has: mean lift and moment; and the Strouhal number."""
@@ -181,22 +96,21 @@ class Body(Channel):
     def surface_points(self) -> Surface:
         """Return the pieces of the bodies as carried, from the leading edge over the upper side and back below."""
         left, _, right, _ = self._upright.bounds
-        bodies = [outline if left.is_empty else left for outline, left in zip(self.outlines, self.carried, strict=True)]
-        parts = shapely.MultiPolygon([part for body in bodies for part in shapely.get_parts(body)])
-        return along(parts, self.angle_of_attack, (left, right)).moved(self.centre)
+        return along(self._carried_parts, self.angle_of_attack, (left, right)).moved(self.centre)
 
 
-def _square_cylinder() -> shapely.Polygon:
-    return shapely.box(-0.5, -0.5, 0.5, 0.5)
+def is_name(shape: str) -> bool:
+    """Whether a shape is asked for by name, not by the path of a file."""
+    return shape == "square_cylinder" or NAME.fullmatch(shape) is not None
 
 
-def _naca0012(count: int = 100) -> shapely.Polygon:
-    """Return the NACA 0012 airfoil of chord 1 with a closed trailing edge and 2 count points."""
-    x = 0.5 * (1 - np.cos(np.linspace(0, np.pi, count + 1)))
-    powers = np.stack([np.sqrt(x), x, x**2, x**3, x**4])
-    y = 0.6 * np.array([0.2969, -0.1260, -0.3516, 0.2843, -0.1036]) @ powers
-    return shapely.Polygon(np.concatenate([np.stack([x, y], axis=1), np.stack([x, -y], axis=1)[-2:0:-1]]))
+def named(shape: str) -> shapely.Polygon:
+    """Return the shape of that name.
 
-
-SHAPES: dict[str, Callable[[], shapely.Polygon]] = {"square_cylinder": _square_cylinder, "naca0012": _naca0012}
-"""The shapes that have a name."""
+    Raises
+    ------
+    ValueError
+        If it is named like an airfoil that does not exist.
+    """
+    match = NAME.fullmatch(shape)
+    return naca(match[1]) if match else shapely.box(-0.5, -0.5, 0.5, 0.5)

@@ -81,7 +81,7 @@ for _name, _action in (("run", _run), ("describe", _describe), ("autotune", _aut
             cls=group_of_cases(_action),
             help=COMMANDS[_name][1],
             no_args_is_help=True,
-            subcommand_metavar="CASE|FILE.toml [OPTIONS]",
+            subcommand_metavar="CASE|FILE.toml|FILE.py:CLASS [OPTIONS]",
             epilog=EPILOG,
         ),
         name=_name,

@@ -77,7 +77,10 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
 
 
 class CaseGroup(TyperGroup):
-    """Commands named after the cases; the name of a TOML file stands for the case in it, with its parameters."""
+    """Commands named after the cases; the name of a TOML file stands for the case in it, with its parameters.
+
+    A case of the user's is FILE.py:CLASS.
+    """
 
     action: Callable[..., None]
 
@@ -90,8 +93,7 @@ class CaseGroup(TyperGroup):
         with exit_codes():
             if cmd_name.endswith(".toml"):
                 ctx.obj = config.load(cmd_name)
-                cmd_name = ctx.obj.case.name
-            model = cases.find(cmd_name)
+            model = type(ctx.obj.case) if ctx.obj else cases.find(cmd_name)
         app = typer.Typer(add_completion=False, rich_markup_mode=None)
         text = (model.__doc__ or "").split("\n\nParameters\n")[0]
         app.command(model.name, help=text, short_help=model.title)(_case_command(model, self.action))

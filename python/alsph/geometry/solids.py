@@ -42,6 +42,11 @@ class Solid:
         """Return the particles moved by `offset` (2,)."""
         return Solid(self.position + offset, self.normal, self.depth)
 
+    def mirrored(self) -> Solid:
+        """Return the mirror images of the particles about y = 0."""
+        flip = np.array([1.0, -1.0])
+        return Solid(self.position * flip, self.normal * flip, self.depth)
+
     def particles(self, velocity: ArrayLike = 0.0, body: int = 0) -> dict[str, NDArray[Any]]:
         """Return the arrays of these particles as part of the body with that index."""
         return particles(Kind.SOLID, self.position, velocity, body=body, normal=self.normal, depth=self.depth)

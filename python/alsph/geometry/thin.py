@@ -1,5 +1,7 @@
 """Bodies as a resolution can carry them: parts that are too thin cut off, and two faces where the rest is thin."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import shapely
 from shapely import LineString, MultiPolygon, Point, Polygon, affinity
@@ -65,6 +67,16 @@ def _wide_corners(shape: Polygon | MultiPolygon) -> FloatArray:
 def thickness(shape: Polygon) -> float:
     """Return the diameter of the largest disc in a shape."""
     return float(2 * shapely.maximum_inscribed_circle(shape, tolerance=1e-3 * np.sqrt(shape.area)).length)
+
+
+def solids(shapes: Sequence[Polygon | MultiPolygon], spacing: float, layers: int) -> list[Solid]:
+    """Place particles along the surface of each carried body; those of two that are mirror images are so, too."""
+    made: list[Solid] = []
+    for shape in shapes:
+        image = _mirror_image(shape)
+        twin = next((other for other, outline in zip(made, shapes, strict=False) if _are_same(outline, image)), None)
+        made.append(twin.mirrored() if twin else solid(shape, spacing, layers))
+    return made
 
 
 def solid(shape: Polygon | MultiPolygon, spacing: float, layers: int) -> Solid:
@@ -144,7 +156,11 @@ def _nearest(curve: shapely.Geometry, place: FloatArray) -> FloatArray:
 
 def is_symmetric(shape: Polygon | MultiPolygon) -> bool:
     """Return whether a shape is its own mirror image about y = 0."""
-    return bool(shape.symmetric_difference(_mirror_image(shape)).area < 1e-9 * shape.area)
+    return _are_same(shape, _mirror_image(shape))
+
+
+def _are_same(shape: Polygon | MultiPolygon, other: Polygon | MultiPolygon) -> bool:
+    return bool(shape.symmetric_difference(other).area < 1e-9 * shape.area)
 
 
 def _mirror_image(shape: Polygon | MultiPolygon) -> Polygon | MultiPolygon:

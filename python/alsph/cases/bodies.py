@@ -1,0 +1,156 @@
+"""Flow past bodies of any shape in the cylinder's channel: what a case of one's own says of them is their outlines."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from functools import cached_property
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import shapely
+from pydantic import model_validator
+
+from alsph.analysis.measures import Measure
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
+from alsph.cases import remarks
+from alsph.cases.channel import Channel
+from alsph.cases.remarks import TOO_THIN
+from alsph.errors import ConfigError
+from alsph.geometry.outline import Outline
+from alsph.geometry.packing import pack
+from alsph.geometry.solids import Solid
+from alsph.geometry.surface import Surface, along
+from alsph.geometry.thin import carried, solids
+
+
+class Bodies(Channel):
+    """Flow past bodies of any shape in a channel with free-slip walls and uniform inflow U.
+
+    The solid particles follow the surfaces. What is thinner than 2 Δx, such as a sharp trailing edge, is cut off
+    (:attr:`carried`); a body of which that leaves nothing is refused. Forces are formed with D, and are those of all
+    bodies together as well as of each.
+    """
+
+    body_name: ClassVar[str] = "body"
+
+    @abstractmethod
+    def shapes(self) -> list[Any]:
+        """Return the outline of each body, an array of points (n, 2) or a polygon of shapely.
+
+        Lengths are in D, and the origin is the point (upstream, 0) of the channel.
+        """
+
+    @cached_property
+    def outline(self) -> shapely.Polygon | shapely.MultiPolygon:
+        """The body, or all bodies together."""
+        polygons = Outline.of(self.shapes()).polygons
+        return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
+
+    @model_validator(mode="after")
+    def _fits_in(self) -> Self:
+        left, bottom, right, top = self.outline.bounds
+        room = min(
+            self.upstream + left, self.length - self.upstream - right, bottom + self.height / 2, self.height / 2 - top
+        )
+        if room < 0.5:
+            what, come = ("the body", "comes") if len(self.outlines) == 1 else ("the bodies together", "come")
+            raise ValueError(
+                f"{what}, {right - left:.3g} D long and {top - bottom:.3g} D high, {come} within {room:.3g} D of a "
+                "side of the channel; leave at least 0.5 D"
+            )
+        return self
+
+    @property
+    def outlines(self) -> list[shapely.Polygon]:
+        """The single bodies of :attr:`outline`."""
+        return list(shapely.get_parts(self.outline))
+
+    @property
+    def thickness(self) -> float:
+        """Extent of the bodies across the stream [D]."""
+        _, bottom, _, top = self.bounds
+        return top - bottom
+
+    @cached_property
+    def carried(self) -> list[shapely.Polygon | shapely.MultiPolygon]:
+        """The single bodies without what is too thin for the resolution."""
+        return [carried(outline, self.particle_spacing) for outline in self.outlines]
+
+    @property
+    def coefficient_bodies(self) -> list[str]:
+        """``body``, or ``body_1``, ``body_2``, ... where there are several."""
+        count = len(self.outlines)
+        return ["body"] if count == 1 else [f"body_{number}" for number in range(1, count + 1)]
+
+    @cached_property
+    def _solids(self) -> list[Solid]:
+        if too_thin := [remark for remark in self.remarks() if remark.startswith(TOO_THIN)]:
+            raise ConfigError(too_thin[0])
+        return solids(self.carried, self.particle_spacing, self.support_layers)
+
+    def solids(self) -> list[Solid]:
+        """Return layers along the surface of each body, with two faces where it is thin.
+
+        Raises
+        ------
+        ConfigError
+            If a body is too thin for the resolution.
+        """
+        return self._solids
+
+    def fluid(self, cells: FloatArray) -> FloatArray:
+        """Return fluid evenly spaced around the bodies, as much as they leave of the cells."""
+        position = np.concatenate([solid.position for solid in self._solids])
+        bodies = shapely.union_all(self.carried)
+        return np.asarray(self.centre + pack(cells - self.centre, bodies, position, self.particle_spacing))
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Left, bottom, right and top of the bodies, relative to the point (upstream, 0) [D]."""
+        left, bottom, right, top = self.outline.bounds
+        return left, bottom, right, top
+
+    @property
+    def size(self) -> float:
+        """Larger extent of the body, of the smallest one if there are several [D]."""
+        lower, upper = np.split(shapely.bounds(shapely.get_parts(self.outline)), 2, axis=1)
+        return float((upper - lower).max(axis=1).min())
+
+    def scales(self) -> dict[str, float]:
+        """Return those of the flow and the thickness of the body's thinnest part."""
+        thinnest = remarks.thinnest(self.outline) / self.particle_spacing
+        return super().scales() | {"thickness of the thinnest part, Δx": thinnest}
+
+    def remarks(self) -> list[str]:
+        """Return what is to be said of the resolution, the method, the channel and parts of the body."""
+        what = "this body; it has" if len(self.outlines) == 1 else "these bodies; they have"
+        unknown = f"not validated: flow past {what} not been compared with the results of others"
+        thin = [
+            remark
+            for name, outline, left in zip(self.coefficient_bodies, self.outlines, self.carried, strict=True)
+            for remark in remarks.thin(name, outline, left, self.particle_spacing)
+        ]
+        return [*super().remarks(), *thin, unknown]
+
+    def measures(self, run: Record) -> list[Measure]:
+        """Return the forces on all bodies together, the Strouhal number, and the mean forces on each of several."""
+        several = self.coefficient_bodies if len(self.coefficient_bodies) > 1 else []
+        return [
+            *super().measures(run),
+            *(
+                Measure(f"mean {kind} coefficient of {name}", run.load(axis, name).mean)
+                for name in several
+                for kind, axis in (("drag", "x"), ("lift", "y"))
+            ),
+        ]
+
+    def surface_points(self) -> Surface:
+        """Return the pieces of the bodies as carried, from the foremost point over the upper side and back below."""
+        left, _, right, _ = self.bounds
+        return along(self._carried_parts, 0.0, (left, right)).moved(self.centre)
+
+    @property
+    def _carried_parts(self) -> shapely.MultiPolygon:
+        bodies = [outline if left.is_empty else left for outline, left in zip(self.outlines, self.carried, strict=True)]
+        return shapely.MultiPolygon([part for body in bodies for part in shapely.get_parts(body)])
