@@ -2,13 +2,14 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
+ENVIRONMENT := .venv/.environment
 TOOLS := .venv/.tools
 MUTMUT := target/mutmut
 EXTENSION := python/alsph/_alsph.abi3.so
 SOURCES := Cargo.toml Cargo.lock pyproject.toml $(shell find rust -name '*.rs')
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: build run test test-rust test-python test-validation validate bench clean mutants-python
+.PHONY: build run wheel test test-rust test-python test-validation validate bench clean mutants-python
 
 build: $(EXTENSION)
 
@@ -24,7 +25,7 @@ test-rust: $(TOOLS)
 	cargo clippy --features python -- -D warnings
 	cargo test
 
-test-python: $(EXTENSION)
+test-python: $(EXTENSION) $(TOOLS)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
@@ -36,6 +37,10 @@ test-validation: $(EXTENSION)  ## The quick validation from scratch.
 
 validate: $(EXTENSION)  ## Cases beside their reference solutions, in minutes on two cores.
 	$(BIN)/alsph validate
+
+wheel: $(ENVIRONMENT)  ## A wheel for every Linux of this machine's kind with glibc 2.28 or later, in target/wheels.
+	$(BIN)/python -m pip install --quiet --group wheel
+	$(BIN)/maturin build --release --zig --compatibility manylinux_2_28
 
 bench:
 	cargo bench
@@ -53,14 +58,19 @@ clean:
 	cargo clean
 	rm -rf .venv $(EXTENSION) .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
-$(TOOLS): pyproject.toml
+# What a run needs to be built; what a run needs itself comes with the extension.
+$(ENVIRONMENT): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "alsph needs Python 3.11 or later; set PYTHON=...")'
 	@command -v cargo >/dev/null || { echo "alsph needs Rust: https://rustup.rs"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(BIN)/python -m pip install --quiet --group build
+	touch $@
+
+$(TOOLS): $(ENVIRONMENT)
 	$(BIN)/python -m pip install --quiet --group dev
 	touch $@
 
-$(EXTENSION): $(TOOLS) $(SOURCES)
+$(EXTENSION): $(ENVIRONMENT) $(SOURCES)
 	$(BIN)/maturin develop --release
 	touch $@

@@ -104,6 +104,7 @@ PYTHON_FLOORS = (
     ("study",),
     ("__init__",),
     ("cli",),
+    ("__main__",),
 )
 PYTHON_FLOOR = {name: height for height, names in enumerate(PYTHON_FLOORS) for name in names}
 

@@ -24,9 +24,9 @@ from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
 from alsph.memory import check
+from alsph.parameters import Parameters
 
 if TYPE_CHECKING:
-    from alsph.cases.source import Source
     from alsph.results.run import Run
 
 VELOCITY_LIMIT = 50.0
@@ -50,8 +50,8 @@ class Case(Method):
     """Parameters of the case that nothing but its own start depends on."""
     later_names: ClassVar[tuple[str, ...]] = ()
     """Measures and profiles, or beginnings of their names, that only a run with some results has."""
-    code: ClassVar[Source | None] = None
-    """The Python file of the user's that it stands in."""
+    code: ClassVar[Parameters | None] = None
+    """The Python file of the user's that it stands in, a :class:`alsph.cases.source.Source`."""
 
     reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, ge=8, description="particles per reference length, D/Δx [-]")
