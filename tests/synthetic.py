@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from alsph.cases import Cylinder
 from alsph.config import Config, RunSettings
-from alsph.folder import surface
+from alsph.folder import samples
 from alsph.folder.run_folder import RunFolder
 from alsph.results.run import Run
 
@@ -80,7 +80,10 @@ def particles(case):
 
 def append_surface(folder: RunFolder, time, points, sample):
     """Append a sample (m,) of C_p at points told by arrays, ``angle`` among them."""
-    folder.append("surface.h5", lambda path: surface.append(path, np.array([time]), points, np.asarray(sample)[None]))
+    folder.append(
+        "surface.h5",
+        lambda path: samples.append(path, np.array([time]), points, {"pressure_coefficient": np.asarray(sample)[None]}),
+    )
 
 
 def write_run(path: Path, case=SHORT, *, end=60.0) -> Path:

@@ -13,7 +13,7 @@ from alsph import config
 from alsph.cases import Cylinder, TaylorGreen
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError, Interrupted, RunFolderError, SolverError
-from alsph.folder import run_folder, surface
+from alsph.folder import run_folder, samples
 from alsph.running.control import Control, interruptible
 from alsph.running.start import resume, start
 
@@ -122,13 +122,13 @@ def test_a_run_that_does_not_know_all_parameters_is_not_resumed(small, tmp_path)
 
 
 def test_disk_that_fills_up_leaves_a_folder_that_resumes(small, tmp_path, monkeypatch):
-    usage, append = shutil.disk_usage(tmp_path), surface.append
+    usage, append = shutil.disk_usage(tmp_path), samples.append
 
     def fill(*arguments):
         monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=10))
         append(*arguments)
 
-    monkeypatch.setattr(surface, "append", fill)
+    monkeypatch.setattr(samples, "append", fill)
     with pytest.raises(RunFolderError, match="disk full"):
         small.run(tmp_path / "run", until=0.2, progress=False)
     monkeypatch.undo()

@@ -9,10 +9,13 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 import tomli_w
 from pydantic import Field
 
 from alsph import cases
+from alsph.analysis.probes import points
+from alsph.arrays import FloatArray
 from alsph.errors import ConfigError, RunFolderError
 from alsph.parameters import Parameters
 from alsph.text import contents, shown
@@ -38,6 +41,13 @@ class RunSettings(Parameters):
     output_interval: float = Field(default=1.0, gt=0, description="time between two outputs of the particles [D/U]")
     surface_interval: float = Field(
         default=0.1, gt=0, description="time between two samples of the surface pressure [D/U]"
+    )
+    probes: str | list[list[float]] | None = Field(
+        default=None,
+        description="points where velocity and pressure are recorded, and lines of them: 'X,Y; X,Y:X,Y:COUNT' [D]",
+    )
+    probe_interval: float | None = Field(
+        default=None, gt=0, description="time between two records of the probes, 0.05 if not given [D/U]"
     )
     checkpoint_minutes: float = Field(default=10.0, gt=0, description="longest time between two checkpoints [min]")
     flush_seconds: float = Field(
@@ -69,6 +79,23 @@ class Config:
         neighbours = case.support_layers**case.space_dimensions
         steps = self.until * case.resolution / case.expected_time_step()
         return float(case.particle_estimate() * neighbours * steps * case.passes)
+
+    @property
+    def probes(self) -> FloatArray:
+        """Points (m, d) of the probes [D].
+
+        Raises
+        ------
+        ConfigError
+            If they are no points of the domain.
+        """
+        found = points(self.run.probes or [], self.case.space_dimensions)
+        domain = self.case.domain()
+        for point in found:
+            if not (np.all(point >= domain["lower"]) and np.all(point <= domain["upper"])):
+                box = f"{domain['lower']} to {domain['upper']} [D]"
+                raise ConfigError(f"run.probes: {point.tolist()} lies outside of the domain, {box}")
+        return found
 
     def tables(self) -> dict[str, Any]:
         """Return the content of the configuration file; what is not set is left out."""

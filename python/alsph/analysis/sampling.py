@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.errors import ConfigError
-from alsph.geometry.particles import Kind, neighbour_tree
+from alsph.geometry.particles import Kind, Snapshot, neighbour_tree
 
 NEIGHBOURS_PER_DIMENSION = 8
 SINGULAR = 1e-5  # directions that the neighbours determine less well than this are left out of a fit
@@ -43,6 +43,44 @@ def fill(position: FloatArray, points: FloatArray, spacing: float) -> FloatArray
     width = 0.7 * spacing
     kernel = np.exp(-0.5 * (distance / width) ** 2) / (np.sqrt(2 * np.pi) * width) ** points.shape[1]
     return np.asarray(spacing ** points.shape[1] * kernel.sum(axis=1))
+
+
+def checked_points(points: ArrayLike, dimensions: int) -> FloatArray:
+    """Return points (m, d).
+
+    Raises
+    ------
+    ConfigError
+        If they are none.
+    """
+    try:
+        found = np.atleast_2d(np.asarray(points, float))
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.ndim != 2 or found.shape[1] != dimensions or not np.isfinite(found).all():
+        raise ConfigError(f"points: must be points of {dimensions} finite numbers, an array (m, {dimensions}) [D]")
+    return found
+
+
+def at(snapshot: Snapshot, points: FloatArray, spacing: float) -> dict[str, FloatArray]:
+    """Return velocity and pressure of the fluid of a snapshot, and their gradients, at points (m, d).
+
+    See :meth:`alsph.Run.sample`.
+    """
+    fluid = snapshot.fluid
+    position = snapshot.position[fluid]
+    fields = np.column_stack([snapshot.velocity[fluid], snapshot.pressure[fluid]])
+    parts = [points[first : first + CHUNK] for first in range(0, max(len(points), 1), CHUNK)]
+    found = [interpolate(position, fields, part, spacing) for part in parts]
+    values, gradients = (np.concatenate(each) for each in zip(*found, strict=True))
+    void = neighbour_tree(position).query(points)[0] > VOID * spacing
+    values[void], gradients[void] = np.nan, np.nan
+    return {
+        "velocity": values[:, :-1],
+        "pressure": values[:, -1],
+        "velocity_gradient": gradients[:, :-1],
+        "pressure_gradient": gradients[:, -1],
+    }
 
 
 def interpolate(

@@ -22,6 +22,7 @@ COMMANDS = {
     "repeat": ("runs", "Repeat a run from its start, without writing anything, and compare it bit by bit."),
     "info": ("runs", "Tell the state and the results of a run."),
     "plot": ("runs", "Draw the figures of a run."),
+    "animate": ("runs", "Make a film of a field from the snapshots of a run."),
     "validate": ("studies", "Run cases at several resolutions and compare them with their references."),
     "study": ("studies", "Run a parameter study, draw its figures and write its tables."),
     "autotune": ("of_cases", "Find the largest stable time step and the cheapest iterations."),

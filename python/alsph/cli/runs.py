@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.progress import Progress
 
 from alsph import plotting
 from alsph.cli.options import Retry, RunPath, Threads, Walltime
@@ -91,6 +93,37 @@ def _plot(
     for name, draw in drawings.items():
         draw(figures / f"{name}.png")
         say(figures / f"{name}.png")
+
+
+@app.command("animate")
+@exit_codes()
+def _animate(
+    path: RunPath,
+    field: Annotated[str, typer.Option(help="field to draw")] = "vorticity",
+    start: Annotated[float | None, typer.Option(help="time to start at [D/U]", show_default="the first")] = None,
+    end: Annotated[float | None, typer.Option(help="time to end at [D/U]", show_default="the last")] = None,
+    every: Annotated[int, typer.Option(help="take one snapshot of so many")] = 1,
+    fps: Annotated[float, typer.Option(help="pictures a second")] = 12.0,
+    limit: Annotated[float | None, typer.Option(help="end of the colour scale", show_default="from the fields")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="file, .gif, .mp4 or .webm", show_default="RUN/figures/FIELD.gif"),
+    ] = None,
+) -> None:
+    """Make a film of a field from the snapshots of a run.
+
+    A run writes a snapshot every output_interval. MP4 and WebM need pip install 'alsph[video]'.
+    """
+    run = Run(path)
+    times = {name: value for name, value in (("start", start), ("end", end)) if value is not None}
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("pictures", total=None)
+
+        def progress(done: int, count: int) -> None:
+            bar.update(task, completed=done, total=count)
+
+        film = run.animate(field, output, every=every, fps=fps, limit=limit, progress=progress, **times)
+    say(film)
 
 
 def say_run(run: Run) -> None:

@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from alsph.analysis.probes import Probes
 from alsph.arrays import FloatArray
 from alsph.errors import RunFolderError
 from alsph.folder.durable import viewing
@@ -190,6 +191,24 @@ def surface(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
             raise ValueError(f"shapes {angle.shape}, {time.shape}, {samples.shape} do not match")
     count = min(len(time), len(samples))
     return angle, time[:count], samples[:count]
+
+
+def probes(path: Path, dimensions: int) -> Probes:
+    """Read ``probes.h5``; all arrays are empty if there is no file."""
+    if not path.exists():
+        empty = np.empty((0, dimensions))
+        return Probes(empty, np.empty(0), empty[None][:0], np.empty((0, 0)))
+    with _opened(path) as file:
+        names = ("position", "time", "velocity", "pressure")
+        arrays = {name: np.asarray(rows(sound(file, name, SURFACE_EXPANSION)), float) for name in names}
+        count = min(len(arrays[name]) for name in names[1:])
+        position, time, velocity, pressure = arrays["position"], *(arrays[name][:count] for name in names[1:])
+        if position.shape[1:] != (dimensions,) or (velocity.shape, pressure.shape) != (
+            (count, *position.shape),
+            (count, len(position)),
+        ):
+            raise ValueError(f"shapes {position.shape}, {velocity.shape}, {pressure.shape} do not match")
+        return Probes(position, time, velocity, pressure)
 
 
 def surface_points(path: Path) -> Surface | None:

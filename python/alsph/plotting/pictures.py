@@ -83,11 +83,11 @@ def field(
         If there is no such field, or the snapshot is in 3-D.
     """
     field_style(name)
-    left, right, bottom, top = extent = _extent(snapshot, spacing, view)
+    left, right, bottom, top = part = extent_of(snapshot, spacing, view)
     width = 9.0
     figure = blank(width, max(2.5, 0.81 * width * (top - bottom) / (right - left) + 0.75), "compressed")
     axes = figure.subplots()
-    _draw_field(axes, snapshot, name, spacing, extent, limit)
+    _draw_field(axes, snapshot, name, spacing, part, limit)
     axes.set(title=f"{TIME_LABEL} = {snapshot.time:.2f}")
     return figure
 
@@ -114,7 +114,7 @@ def fields(
         If there is no such field, or a snapshot is in 3-D.
     """
     (first, spacing), *_ = snapshots.values()
-    left, right, bottom, top = extent = _extent(first, spacing, view)
+    left, right, bottom, top = part = extent_of(first, spacing, view)
     width = 6.5
     height = 0.85 * width * (top - bottom) / (right - left) + 0.6
     figure = blank(width * len(names), height * len(snapshots))
@@ -122,7 +122,7 @@ def fields(
     for column, name in zip(grid.T, names, strict=True):
         limit: float | None = None
         for axes, (title, (snapshot, spacing)) in zip(column, snapshots.items(), strict=True):
-            limit = _draw_field(axes, snapshot, name, spacing, extent, limit)
+            limit = _draw_field(axes, snapshot, name, spacing, part, limit)
             axes.set_title(f"{title}, {TIME_LABEL} = {snapshot.time:.2f}", fontsize="medium")
     return figure
 
@@ -139,8 +139,7 @@ def _draw_field(
     style = field_style(name)
     if limit is not None and not (isinstance(limit, int | float | np.number) and 0 < limit < np.inf):
         raise ConfigError(f"limit = {shown(limit)}: must be a number above zero")
-    values = np.linalg.norm(snapshot.velocity, axis=1) if name == "velocity" else getattr(snapshot, name)
-    picture, body = _raster(snapshot, values, spacing, extent)
+    picture, body = _raster(snapshot, _values(snapshot, name), spacing, extent)
     limit = limit or _limit(picture)
     lowest = -limit if style.signed else 0.0
     frame: dict[str, Any] = {"extent": extent, "origin": "lower"}
@@ -154,7 +153,19 @@ def _draw_field(
     return limit
 
 
-def _extent(snapshot: Snapshot, spacing: float, view: Sequence[float] | None) -> tuple[float, float, float, float]:
+def colour_limit(snapshot: Snapshot, name: str, spacing: float, extent: tuple[float, float, float, float]) -> float:
+    """Return the end of the colour scale that a picture of a part of the plane has by itself."""
+    return _limit(_raster(snapshot, _values(snapshot, name), spacing, extent)[0])
+
+
+def _values(snapshot: Snapshot, name: str) -> FloatArray:
+    values = np.linalg.norm(snapshot.velocity, axis=1) if name == "velocity" else getattr(snapshot, name)
+    return np.asarray(values)
+
+
+def extent_of(
+    snapshot: Snapshot, spacing: float, view: Sequence[float] | None = None
+) -> tuple[float, float, float, float]:
     """Return left, right, bottom and top of the view; without one, of the fluid without inlet and outlet buffers."""
     if snapshot.position.shape[1] != 2:
         raise ConfigError("pictures are drawn in 2-D only; open particles.vtkhdf in ParaView")

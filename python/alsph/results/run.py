@@ -11,16 +11,20 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from alsph.analysis import averages, sampling
 from alsph.analysis.averages import Estimate, Window
 from alsph.analysis.loads import Divergence, Load, PressureCoefficient
 from alsph.analysis.measures import Measure, Profile
+from alsph.analysis.probes import Probes
 from alsph.arrays import AXES, FloatArray
 from alsph.cases import remarks
+from alsph.cases.source import shown_name
 from alsph.config import Config, of_run
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
+from alsph.folder.durable import check_folder
 from alsph.folder.run_folder import RunFolder
 from alsph.geometry.particles import Snapshot
 from alsph.parameters import checked_point, choose
@@ -254,6 +258,38 @@ class Run:
             surface = case if case and np.array_equal(case.angle, angle) else None
         return PressureCoefficient(angle, mean, deviation, int(inside), self.window.developing, surface)
 
+    @cached_property
+    def probes(self) -> Probes:
+        """Velocity and pressure at the probes over time; empty without any."""
+        return reading.probes(self.path / "probes.h5", self.config.case.space_dimensions)
+
+    def sample(self, points: ArrayLike, time: float | None = None) -> dict[str, FloatArray]:
+        """Velocity, pressure and their gradients at any points of a snapshot.
+
+        Parameters
+        ----------
+        points : array_like, shape (m, d)
+            The points [D].
+        time : float, optional
+            The snapshot nearest to it is taken [D/U]; the last one if None.
+
+        Returns
+        -------
+        dict of ndarray
+            ``velocity`` (m, d), ``pressure`` (m,), ``velocity_gradient`` (m, d, d), the derivative of component k
+            along direction l at [:, k, l], and ``pressure_gradient`` (m, d), by quadratic moving least squares; NaN
+            where no fluid is within 1.5 Δx.
+
+        Raises
+        ------
+        ConfigError
+            If `points` are none, or `time` is no number.
+        RunFolderError
+            If there is no snapshot.
+        """
+        dimensions = self.config.case.space_dimensions
+        return sampling.at(self.snapshot(time), sampling.checked_points(points, dimensions), self.spacing)
+
     def _measure(self, measure: Callable[[FloatArray, FloatArray, Window], Estimate], values: FloatArray) -> Estimate:
         if np.isnan(values).all():
             return Estimate(np.nan, note="no steps recorded yet" if len(values) == 0 else "no body to measure")
@@ -398,6 +434,36 @@ class Run:
         _plotting().field_style(name)
         return self._saved(_plotting().field(self.snapshot(time), name, self.spacing, limit=limit, view=view), path)
 
+    def animate(self, name: str = "vorticity", path: str | Path | None = None, **options: Any) -> Path:
+        """Make a film of a field from the snapshots.
+
+        Parameters
+        ----------
+        name : {"vorticity", "pressure", "velocity", "velocity_divergence"}
+        path : path, optional
+            File that ends in .gif or, with imageio-ffmpeg (``pip install 'alsph[video]'``), .mp4 or .webm; ``NAME.gif``
+            among the run's figures if None.
+        **options
+            ``start`` and ``end``, times [D/U]; ``every``, of how many snapshots one is taken; ``fps``, pictures a
+            second; ``limit`` and ``view`` as of :meth:`plot_field`, the same for all pictures.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ConfigError
+            If there are fewer than two snapshots, the run is in 3-D, or an option cannot be used.
+        """
+        if path is None:
+            check_folder(self.path / "figures")
+            (self.path / "figures").mkdir(exist_ok=True)
+        target = Path(path) if path is not None else self.path / "figures" / f"{name}.gif"
+        _plotting().animate(self, name, target, said=self._said(), **options)
+        return target
+
     def plot_pressure_coefficient(
         self, path: str | Path | None = None, reference: tuple[FloatArray, FloatArray] | None = None
     ) -> Figure:
@@ -419,20 +485,25 @@ class Run:
         return self._saved(_plotting().ledger(self), path)
 
     def _saved(self, figure: Figure, path: str | Path | None) -> Figure:
-        try:
-            said = remarks.brief(self.remarks)
-        except RunFolderError:  # a field can be drawn all the same
-            said = "no remarks: case or history of the run cannot be read"
-        _plotting().remark(figure, said)
+        _plotting().remark(figure, self._said())
         if path is not None:
             _plotting().save(figure, path)
         return figure
+
+    def _said(self) -> str:
+        """Return the run's remarks in short, as they stand below its figures."""
+        try:
+            return remarks.brief(self.remarks)
+        except RunFolderError:  # a field can be drawn all the same
+            return "no remarks: case or history of the run cannot be read"
 
     def __repr__(self) -> str:
         """Name the folder, the case, the status and the time reached."""
         time = self.history["time"]
         reached = time[-1] if len(time) else 0.0
-        return printable(f"Run('{self.path}': {self.case.get('case', 'unknown')}, {self.status}, tU/D = {reached:.4g})")
+        return printable(
+            f"Run('{self.path}': {shown_name(self.case.get('case', 'unknown'))}, {self.status}, tU/D = {reached:.4g})"
+        )
 
     def _repr_html_(self) -> str:
         rows = ((html.escape(name), html.escape(printable(str(value)))) for name, value in self.summary().items())

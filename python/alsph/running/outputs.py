@@ -9,49 +9,67 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from alsph.arrays import FloatArray
 from alsph.config import Config
 from alsph.engine.output import Output
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError
-from alsph.folder import surface
+from alsph.folder import samples
 from alsph.geometry.surface import Surface
 
+PROBE_INTERVAL = 0.05
+"""Time between two records of probes where none is given [D/U]."""
 
-class SurfacePressure:
-    """C_p = (p - p_0) / (½ρU²) on a surface, with p_0 the pressure at the inlet."""
 
-    file = "surface.h5"
+class Samples:
+    """Fields at fixed points over time."""
 
-    def __init__(self, points: Surface, interval: float) -> None:
-        self.points, self.interval = points, interval
-        self.samples: list[tuple[float, Any]] = []
+    def __init__(self, file: str, interval: float, points: Mapping[str, FloatArray]) -> None:
+        self.file, self.interval, self.points = file, interval, points
+        self.taken: list[tuple[float, Mapping[str, FloatArray]]] = []
+
+    def sample(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> dict[str, FloatArray]:
+        """Return the ``velocity`` (m, d) and ``pressure`` (m,) at the points."""
+        return simulation.sample(self.points["position"])
 
     def record(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> None:
-        """Sample the surface."""
-        pressure = simulation.sample(self.points.position)["pressure"]
-        self.samples.append((simulation.time, 2 * (pressure - rows["inlet_pressure"][-1])))
+        """Sample the points."""
+        self.taken.append((simulation.time, self.sample(simulation, rows)))
 
     def append(self, path: Path) -> None:
         """Append the samples."""
-        if self.samples:
-            times, samples = (np.array(values) for values in zip(*self.samples, strict=True))
-            surface.append(path, times, self.points.arrays(), samples)
-            self.samples = []
+        if self.taken:
+            times, fields = zip(*self.taken, strict=True)
+            values = {name: np.stack([each[name] for each in fields]) for name in fields[0]}
+            samples.append(path, np.array(times), self.points, values)
+            self.taken = []
 
     def truncate(self, path: Path, time: float) -> None:
         """Drop later samples."""
-        surface.truncate(path, time)
+        samples.truncate(path, time)
+
+
+class SurfacePressure(Samples):
+    """C_p = (p - p_0) / (½ρU²) on a surface, with p_0 the pressure at the inlet."""
+
+    def __init__(self, points: Surface, interval: float) -> None:
+        super().__init__("surface.h5", interval, points.arrays())
+
+    def sample(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> dict[str, FloatArray]:
+        """Return C_p."""
+        pressure = super().sample(simulation, rows)["pressure"]
+        return {"pressure_coefficient": 2 * (pressure - rows["inlet_pressure"][-1])}
 
 
 def outputs_of(config: Config) -> list[Output]:
-    """Return what a run records: the pressure on the surface of its body, if it has one, and what its case adds.
+    """Return what a run records: the pressure on the surface of its body, if it has one, probes, what its case adds.
 
     Raises
     ------
     ConfigError
-        If an output of the case has a name or an interval that cannot be.
+        If an output of the case has a name or an interval that cannot be, or a probe is not in the domain.
     """
-    points, own = config.case.surface_points(), config.case.outputs()
+    points, own, run = config.case.surface_points(), config.case.outputs(), config.run
     for output in own:
         if not (isinstance(output.file, str) and re.fullmatch(r"output_\w+\.\w+", output.file)):
             raise ConfigError(
@@ -62,4 +80,9 @@ def outputs_of(config: Config) -> list[Output]:
     for name, count in Counter(output.file for output in own).items():
         if count > 1:
             raise ConfigError(f"case '{config.case.name}': {count} outputs have the file {name}; one file, one output")
-    return [*([SurfacePressure(points, config.run.surface_interval)] if points else []), *own]
+    probes = config.probes
+    return [
+        *([SurfacePressure(points, run.surface_interval)] if points else []),
+        *([Samples("probes.h5", run.probe_interval or PROBE_INTERVAL, {"position": probes})] if len(probes) else []),
+        *own,
+    ]

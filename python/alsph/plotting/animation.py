@@ -1,0 +1,110 @@
+"""Films of the particles' fields."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alsph.analysis.record import Record
+from alsph.errors import ConfigError
+from alsph.folder.durable import check_target, replacing
+from alsph.plotting import pictures
+from alsph.plotting.style import remark
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Frame = NDArray[np.uint8]
+
+VIDEO = (".mp4", ".webm")
+DPI = 100
+SCALED_BY = 5
+"""Number of snapshots, evenly over the film, that the colour scale is made for."""
+
+
+def animate(
+    run: Record,
+    name: str,
+    path: Path,
+    *,
+    start: float = -np.inf,
+    end: float = np.inf,
+    every: int = 1,
+    fps: float = 12.0,
+    limit: float | None = None,
+    view: tuple[float, float, float, float] | None = None,
+    said: str = "",
+    progress: Callable[[int, int], None] = lambda done, count: None,
+) -> None:
+    """Make a film of a field; see :meth:`alsph.Run.animate`.
+
+    `said` is written below each picture; `progress` is called with the number of pictures that are done, and of all.
+    """
+    if not (isinstance(every, int) and every >= 1):
+        raise ConfigError(f"every = {every!r}: must be a whole number above zero")
+    if not 0.1 <= fps <= 100:
+        raise ConfigError(f"fps = {fps:g}: must lie between 0.1 and 100 pictures a second")
+    if path.suffix.lower() not in (".gif", *VIDEO):
+        raise ConfigError(f"{path}: a film ends in .gif, .mp4 or .webm")
+    pictures.field_style(name)
+    times = [time for time in run.times if start <= time <= end][::every]
+    if len(times) < 2:
+        raise ConfigError(f"a film needs two snapshots or more, and there are {len(times)}; lower output_interval")
+    view = pictures.extent_of(run.snapshot(times[0]), run.spacing, view)
+    if limit is None:
+        chosen = sorted({times[round(k)] for k in np.linspace(0, len(times) - 1, SCALED_BY)})
+        limit = max(pictures.colour_limit(run.snapshot(time), name, run.spacing, view) for time in chosen)
+
+    def frames() -> Iterator[Frame]:
+        for done, time in enumerate(times, 1):
+            figure = pictures.field(run.snapshot(time), name, run.spacing, limit=limit, view=view)
+            remark(figure, said)
+            yield _pixels(figure)
+            progress(done, len(times))
+
+    check_target(path)
+    with replacing(path) as temporary:
+        (_write_gif if path.suffix.lower() == ".gif" else _write_video)(frames(), temporary, fps, path.suffix)
+
+
+def _pixels(figure: Figure) -> Frame:
+    """Return the picture (rows, columns, 3), both even, as videos want them."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure.set_dpi(DPI)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
+    rows, columns = (2 * (size // 2) for size in pixels.shape[:2])
+    return np.ascontiguousarray(pixels[:rows, :columns])
+
+
+def _write_gif(frames: Iterator[Frame], path: Path, fps: float, _: str) -> None:
+    from PIL import Image
+
+    first, rest = Image.fromarray(next(frames)), (Image.fromarray(frame) for frame in frames)
+    first.save(path, format="GIF", save_all=True, append_images=rest, duration=round(1000 / fps), loop=0)
+
+
+def _write_video(frames: Iterator[Frame], path: Path, fps: float, suffix: str) -> None:
+    try:
+        import imageio_ffmpeg
+    except ImportError:
+        raise ConfigError(
+            f"a film in the format {suffix} needs imageio-ffmpeg: pip install 'alsph[video]', or ask for .gif"
+        ) from None
+    first = next(frames)
+    options: dict[str, Any] = {"fps": fps, "macro_block_size": 2, "output_params": ["-f", suffix[1:]]}
+    codec = {"codec": "libvpx-vp9"} if suffix == ".webm" else {}
+    writer = imageio_ffmpeg.write_frames(str(path), first.shape[1::-1], **options, **codec)
+    writer.send(None)
+    try:
+        for frame in itertools.chain([first], frames):
+            writer.send(frame)
+    finally:
+        writer.close()

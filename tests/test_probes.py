@@ -1,0 +1,158 @@
+"""Velocity and pressure at points: as a run goes, of a snapshot, and films."""
+
+import sys
+
+import alsph
+import numpy as np
+import pytest
+from alsph.analysis.probes import points
+from alsph.cases import Body, TaylorGreen
+from alsph.config import Config, RunSettings
+from alsph.errors import ConfigError, RunFolderError
+from alsph.study.declaration import digest
+from PIL import Image
+
+POINTS = "0.3,0.2; 0.5,0.1:0.5,0.9:9"
+
+
+def exact(position, time):
+    x, y = 2 * np.pi * np.moveaxis(position, -1, 0)
+    decay = np.exp(-8 * np.pi**2 * 0.01 * time)
+    velocity = np.stack([-np.cos(x) * np.sin(y), np.sin(x) * np.cos(y)], axis=-1) * decay[..., None]
+    return velocity, -0.25 * (np.cos(2 * x) + np.cos(2 * y)) * decay**2
+
+
+@pytest.fixture(scope="module")
+def vortices(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("probes") / "run"
+    case = TaylorGreen(resolution=40)
+    return case.run(folder, until=0.2, probes=POINTS, probe_interval=0.02, output_interval=0.05, progress=False)
+
+
+def test_points_are_single_ones_and_lines():
+    assert points(POINTS, 2)[[0, 1, -1]].tolist() == [[0.3, 0.2], [0.5, 0.1], [0.5, 0.9]]
+    assert points("1,2 3,4;\n5,6", 2).tolist() == points([[1, 2], [3, 4], [5, 6]], 2).tolist()
+    assert points([], 3).shape == (0, 3) and points("1,2,3", 3).shape == (1, 3)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("6", "'6' is no point, which is two numbers"),
+        ("6,1,2", "is no point"),
+        ("a,b", "is no point"),
+        ("nan,1", "is no point"),
+        ([[1, 2], [3]], "is no point"),
+        ("0,0:1,1", "is no line"),
+        ("0,0:1,1:1", "is no line"),
+        ("0,0:1:3", "is no point"),
+        ("0,0:1,1:3:4", "is no line"),
+        ("0,0:1,1:6000 0,0:1,1:6000", "more than 10000 points"),
+        ("2,0.5", r"\[2.0, 0.5\] lies outside of the domain"),
+    ],
+)
+def test_what_is_no_point_is_refused_before_anything_is_written(tmp_path, given, message):
+    with pytest.raises(ConfigError, match=message):
+        TaylorGreen(resolution=8).run(tmp_path / "run", until=0.02, probes=given, progress=False)
+    assert not list(tmp_path.iterdir())
+
+
+def test_probes_are_near_the_exact_solution(vortices):
+    found = vortices.probes
+    assert found.position.shape == (10, 2) and found.velocity.shape == (len(found.time), 10, 2)
+    assert np.diff(found.time).max() < 0.03 and len(found.time) == 10
+    velocity, pressure = exact(found.position, found.time[:, None])
+    assert found.velocity == pytest.approx(velocity, abs=0.01)
+    assert found.pressure == pytest.approx(pressure, abs=0.04)
+
+
+def test_snapshots_give_the_same_at_the_same_time(vortices):
+    """Two ways: the engine's fit over the kernel's support, and one over the nearest particles of the snapshot."""
+    time = vortices.times[-1]
+    record = int(np.abs(vortices.probes.time - time).argmin())
+    assert vortices.probes.time[record] == time
+    inner = vortices.probes.position[2:-1]  # the snapshot does not know of the other side of the period
+    found = vortices.sample(inner, time)
+    assert found["velocity"] == pytest.approx(vortices.probes.velocity[record, 2:-1], abs=2e-3)
+    assert found["pressure"] == pytest.approx(vortices.probes.pressure[record, 2:-1], abs=0.02)
+    gradient = found["velocity_gradient"]
+    x, y = 2 * np.pi * inner.T
+    decay = np.exp(-8 * np.pi**2 * 0.01 * time)
+    assert gradient[:, 0, 0] == pytest.approx(2 * np.pi * np.sin(x) * np.sin(y) * decay, abs=0.15)
+    assert np.trace(gradient, axis1=1, axis2=2) == pytest.approx(0, abs=0.2)
+
+
+def test_probes_of_a_resumed_run_are_those_of_a_whole_one(tmp_path):
+    case, settings = TaylorGreen(resolution=10), {"probes": [[0.2, 0.3]], "probe_interval": 0.03, "progress": False}
+    whole = case.run(tmp_path / "whole", until=0.4, **settings)
+    case.run(tmp_path / "part", until=0.2, **settings)
+    part = alsph.resume(tmp_path / "part", until=0.4, progress=False)
+    for name in ("time", "velocity", "pressure"):
+        assert np.array_equal(getattr(whole.probes, name), getattr(part.probes, name))
+
+
+def test_inside_a_body_there_is_nothing(tmp_path):
+    body = Body(resolution=10, length=5, height=4, upstream=2)
+    inside, outside = [2.0, 0.0], [2.0, 1.0]
+    run = body.run(tmp_path / "run", until=0.05, probes=[inside, outside], progress=False)
+    assert np.isnan(run.probes.velocity[:, 0]).all() and np.isfinite(run.probes.velocity[:, 1]).all()
+    assert np.isnan(run.sample(inside)["pressure"]).all() and np.isfinite(run.sample(outside)["pressure"]).all()
+
+
+def test_a_run_without_probes_has_none_and_keeps_its_name(tmp_path):
+    run = TaylorGreen(resolution=8).run(tmp_path / "run", until=0.02, progress=False)
+    assert run.probes.velocity.shape == (0, 0, 2) and not (run.path / "probes.h5").exists()
+    assert "probe" not in Config(TaylorGreen()).text()
+    assert digest(Config(TaylorGreen())) != digest(Config(TaylorGreen(), RunSettings(probes="0,0")))
+
+
+def test_a_damaged_file_is_told(tmp_path):
+    run = TaylorGreen(resolution=8).run(tmp_path / "run", until=0.02, probes=[[0.5, 0.5]], progress=False)
+    (run.path / "probes.h5").write_bytes(b"nothing")
+    with pytest.raises(RunFolderError, match="probes.h5"):
+        _ = alsph.open_run(run.path).probes
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [([[0, 0, 0]], "must be points of 2 finite numbers"), ("here", "must be points"), ([[np.nan, 0]], "finite")],
+)
+def test_points_of_a_snapshot_are_checked(vortices, wrong, message):
+    with pytest.raises(ConfigError, match=message):
+        vortices.sample(wrong)
+
+
+def test_a_film_has_a_picture_of_each_snapshot(vortices, tmp_path):
+    done = []
+    film = vortices.animate("vorticity", tmp_path / "film.gif", fps=10, progress=lambda *counts: done.append(counts))
+    with Image.open(film) as gif:
+        assert gif.n_frames == len(vortices.times) == len(done) == done[-1][0] and gif.info["duration"] == 100
+        first = np.asarray(gif.convert("RGB"))
+        gif.seek(gif.n_frames - 1)
+        assert np.abs(first.astype(int) - np.asarray(gif.convert("RGB"))).max() > 10
+    assert vortices.animate("pressure", every=2) == vortices.path / "figures" / "pressure.gif"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"path": "film.png"}, "a film ends in .gif, .mp4 or .webm"),
+        ({"every": 0}, "every = 0"),
+        ({"fps": 1e9}, "fps = 1e"),
+        ({"start": 0.19}, "needs two snapshots or more, and there are 1"),
+        ({"name": "colour"}, "unknown field 'colour'"),
+        ({"limit": -1.0}, "limit = -1.0"),
+    ],
+)
+def test_what_is_wrong_with_a_film_is_told(vortices, tmp_path, monkeypatch, options, message):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match=message):
+        vortices.animate(**{"path": "film.gif"} | options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_video_needs_a_library(vortices, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(ConfigError, match="needs imageio-ffmpeg: pip install"):
+        vortices.animate(path=tmp_path / "film.mp4")
+    assert not list(tmp_path.iterdir())
