@@ -21,7 +21,7 @@ def test_pictures_of_fields(run, name, tmp_path):
     figure = run.plot_field(name, time=20, path=tmp_path / "picture.png")
     axes, bar = figure.axes
     assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
-    assert axes.get_title() == "$tU/D$ = 20.00"
+    assert axes.get_title() == r"cylinder, Re = 200, $D/\Delta x$ = 10, $tU/D$ = 20.00"
     assert (axes.get_xlim(), axes.get_ylim()) == (pytest.approx((0, 8)), pytest.approx((-4, 4)))
     low, high = axes.images[0].get_clim()
     assert low == (0 if name == "velocity" else -high)

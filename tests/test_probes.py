@@ -156,3 +156,41 @@ def test_a_video_needs_a_library(vortices, tmp_path, monkeypatch):
     with pytest.raises(ConfigError, match="needs imageio-ffmpeg: pip install"):
         vortices.animate(path=tmp_path / "film.mp4")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_history_is_a_table(vortices):
+    frame = vortices.to_pandas()
+    assert frame.index.name == "time" and list(frame.index) == list(vortices.history["time"])
+    assert frame["kinetic_energy"].iloc[-1] == vortices.history["kinetic_energy"][-1]
+
+
+def test_a_snapshot_is_a_grid(vortices, tmp_path):
+    grid = vortices.to_xarray(spacing=0.1, lower=(0.2, 0.3), upper=(0.8, 0.7))
+    assert dict(grid.sizes) == {"y": 4, "x": 6} and grid.x.values[[0, -1]] == pytest.approx([0.25, 0.75])
+    there = vortices.sample([[0.45, 0.35]])
+    cell = grid.isel(x=2, y=0)
+    assert float(cell.velocity_y) == pytest.approx(there["velocity"][0, 1])
+    x, y = (2 * np.pi * values for values in np.meshgrid(grid.x, grid.y))
+    decay = np.exp(-8 * np.pi**2 * 0.01 * grid.attrs["time"])
+    assert grid.velocity_x.values == pytest.approx(-np.cos(x) * np.sin(y) * decay, abs=0.01)
+    assert grid.vorticity.values == pytest.approx(4 * np.pi * np.cos(x) * np.cos(y) * decay, abs=0.25)
+    assert dict(vortices.to_xarray().sizes) == {"y": 40, "x": 40}
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"spacing": 0.0}, "spacing = 0.0"),
+        ({"spacing": 1e-12}, "more than 20,000,000 points"),
+        ({"lower": (1, 1)}, "the lower one first"),
+    ],
+)
+def test_what_is_no_grid_is_refused(vortices, options, message):
+    with pytest.raises(ConfigError, match=message):
+        vortices.to_xarray(**options)
+
+
+def test_a_library_that_is_not_there_is_told(vortices, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ConfigError, match="this needs pandas: pip install pandas"):
+        vortices.to_pandas()

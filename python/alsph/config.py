@@ -105,7 +105,7 @@ class Config:
         """Return the same without the settings of the run."""
         values = self.case.model_dump(include=set(self.case.parameter_names()))
         values = {name: values[name] for name in self.case.parameter_names()}
-        return {"case": self.case.reference()} | {name: value for name, value in values.items() if value is not None}
+        return {"case": self.case.declaration()} | {name: value for name, value in values.items() if value is not None}
 
     def text(self) -> str:
         """Return the configuration with all its parameters as TOML."""

@@ -1,6 +1,7 @@
 """The base of all validated parameter sets: strict types, unknown names refused, errors in one line."""
 
 import difflib
+import html
 import inspect
 from collections.abc import Iterable, Sequence
 from typing import Any, NoReturn, Self
@@ -43,6 +44,10 @@ MOST_MISTAKES = 3
 """How many are told at once."""
 
 
+PYDANTICS = {name for name in dir(BaseModel) if not name.startswith("__")}
+"""Names that a set of parameters has of pydantic."""
+
+
 class Parameters(BaseModel):
     """An immutable set of named, validated parameters; :meth:`replace` makes another one.
 
@@ -82,6 +87,18 @@ class Parameters(BaseModel):
             for name in cls.parameter_names()
         ]
         cls.__doc__ = f"{inspect.cleandoc(cls.__doc__ or '')}\n\nParameters\n----------\n" + "\n".join(lines)
+
+    def __dir__(self) -> list[str]:
+        """Return the names to complete, without those of pydantic."""
+        return [name for name in super().__dir__() if name not in PYDANTICS]
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><th>{name}</th><td>{html.escape(shown(getattr(self, name)))}</td>"
+            f"<td style='text-align: left'>{html.escape(self.describe(name))}</td></tr>"
+            for name in self.parameter_names()
+        )
+        return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
 
     @classmethod
     def parameter_names(cls) -> list[str]:

@@ -85,10 +85,10 @@ def find(name: str | dict[str, Any], *folders: Path) -> type[Case]:
     if isinstance(name, dict) or source.is_reference(name):
         model = source.Source(**name).model() if isinstance(name, dict) else source.read(name, *folders)
         if model.name in CASES:
-            raise ConfigError(
-                f"{source.shown_name(model.reference())}: its name, '{model.name}', is that of a case which is there; "
-                "give it one of its own"
+            told = (
+                f"{source.shown_name(model.declaration())}: its name, '{model.name}', is that of a case which is there"
             )
+            raise ConfigError(f"{told}; give it one of its own")
         return model
     if name not in CASES:
         own = "a case of your own is FILE.py:CLASS, an entry point of its package, or put into alsph.cases.CASES before"

@@ -62,7 +62,7 @@ class Case(Method):
         return sorted(cls.model_fields, key=lambda name: name in Method.model_fields)
 
     @classmethod
-    def reference(cls) -> str | dict[str, Any]:
+    def declaration(cls) -> str | dict[str, Any]:
         """Return what stands for the case in a configuration: its name, or the file of the user's that it stands in."""
         code = vars(cls).get("code")
         return code.model_dump() if code else cls.name

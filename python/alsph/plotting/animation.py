@@ -38,12 +38,14 @@ def animate(
     fps: float = 12.0,
     limit: float | None = None,
     view: tuple[float, float, float, float] | None = None,
+    title: str = "",
     said: str = "",
     progress: Callable[[int, int], None] = lambda done, count: None,
 ) -> None:
     """Make a film of a field; see :meth:`alsph.Run.animate`.
 
-    `said` is written below each picture; `progress` is called with the number of pictures that are done, and of all.
+    `title` stands above each picture and `said` below; `progress` is called with the number of pictures that are done,
+    and of all.
     """
     if not (isinstance(every, int) and every >= 1):
         raise ConfigError(f"every = {every!r}: must be a whole number above zero")
@@ -62,7 +64,7 @@ def animate(
 
     def frames() -> Iterator[Frame]:
         for done, time in enumerate(times, 1):
-            figure = pictures.field(run.snapshot(time), name, run.spacing, limit=limit, view=view)
+            figure = pictures.field(run.snapshot(time), name, run.spacing, limit=limit, view=view, title=title)
             remark(figure, said)
             yield _pixels(figure)
             progress(done, len(times))

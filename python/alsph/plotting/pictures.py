@@ -63,6 +63,7 @@ def field(
     *,
     limit: float | None = None,
     view: tuple[float, float, float, float] | None = None,
+    title: str = "",
 ) -> Figure:
     """Picture of a field in 2-D, the bodies in grey.
 
@@ -76,6 +77,8 @@ def field(
         End of the colour scale; from the data if None.
     view : (left, right, bottom, top), optional
         Part of the plane to show [D]; all of it if None.
+    title : str, optional
+        What stands above the picture, before the time.
 
     Raises
     ------
@@ -88,7 +91,7 @@ def field(
     figure = blank(width, max(2.5, 0.81 * width * (top - bottom) / (right - left) + 0.75), "compressed")
     axes = figure.subplots()
     _draw_field(axes, snapshot, name, spacing, part, limit)
-    axes.set(title=f"{TIME_LABEL} = {snapshot.time:.2f}")
+    axes.set_title(f"{title}, " * bool(title) + f"{TIME_LABEL} = {snapshot.time:.2f}")
     return figure
 
 

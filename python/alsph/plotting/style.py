@@ -19,9 +19,9 @@ TIME_LABEL = "$tU/D$"
 
 def blank(width: float, height: float, layout: Literal["constrained", "compressed"] = "constrained") -> Figure:
     """Return an empty figure of a size in inches."""
-    from matplotlib.figure import Figure  # half a second that only pictures take
+    from alsph.plotting.picture import Picture  # half a second that only pictures take
 
-    return Figure(figsize=(width, height), layout=layout)
+    return Picture(figsize=(width, height), layout=layout)
 
 
 def save(figure: Figure, path: str | Path, **options: Any) -> None:

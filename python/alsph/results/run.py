@@ -28,11 +28,14 @@ from alsph.folder.durable import check_folder
 from alsph.folder.run_folder import RunFolder
 from alsph.geometry.particles import Snapshot
 from alsph.parameters import checked_point, choose
+from alsph.results import export
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.outcome import outcome
 from alsph.text import duration, in_figure, printable, shown
 
 if TYPE_CHECKING:
+    import pandas
+    import xarray
     from matplotlib.figure import Figure
 
 
@@ -290,6 +293,56 @@ class Run:
         dimensions = self.config.case.space_dimensions
         return sampling.at(self.snapshot(time), sampling.checked_points(points, dimensions), self.spacing)
 
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the history as a table of pandas, one row a step, by time tU/D.
+
+        Raises
+        ------
+        ConfigError
+            If pandas is not installed.
+        """
+        return export.table(self)
+
+    def to_xarray(
+        self,
+        time: float | None = None,
+        spacing: float | None = None,
+        lower: Sequence[float] | None = None,
+        upper: Sequence[float] | None = None,
+    ) -> xarray.Dataset:
+        """Return velocity, pressure and, in 2-D, vorticity of a snapshot on a regular grid, by :meth:`sample`.
+
+        ``run.to_xarray().to_netcdf("flow.nc")`` makes a file for other programs.
+
+        Parameters
+        ----------
+        time : float, optional
+            The snapshot nearest to it is taken [D/U]; the last one if None.
+        spacing : float, optional
+            Of the grid [D]; that of the particles if None.
+        lower, upper : sequence of float, optional
+            Corners of the box that is covered with cells, whose middles the values are of [D]; those of the domain if
+            None.
+
+        Raises
+        ------
+        ConfigError
+            If xarray is not installed, or there is no such grid.
+        """
+        domain, dimensions = self.config.case.domain(), self.config.case.space_dimensions
+        corners = domain["lower"] if lower is None else lower, domain["upper"] if upper is None else upper
+        box = self._checked_box(*corners, dimensions)
+        return export.grid(self, time, spacing, box)
+
+    @staticmethod
+    def _checked_box(lower: Sequence[float], upper: Sequence[float], dimensions: int) -> tuple[FloatArray, FloatArray]:
+        box = np.array(lower, dtype=float), np.array(upper, dtype=float)
+        if not box[0].shape == box[1].shape == (dimensions,) or not np.all(box[0] < box[1]):
+            raise ConfigError(
+                f"box from {shown(lower)} to {shown(upper)}: needs corners of {dimensions} numbers, the lower one first"
+            )
+        return box
+
     def _measure(self, measure: Callable[[FloatArray, FloatArray, Window], Estimate], values: FloatArray) -> Estimate:
         if np.isnan(values).all():
             return Estimate(np.nan, note="no steps recorded yet" if len(values) == 0 else "no body to measure")
@@ -331,12 +384,7 @@ class Run:
             Averaged over the snapshots in the averaging window; NaN if there are fewer than two.
         """
         times = self.times[(self.times >= self.window.start) & (self.times <= self.window.end)]
-        box = np.array(lower, dtype=float), np.array(upper, dtype=float)
-        dimensions = self.config.case.space_dimensions
-        if not box[0].shape == box[1].shape == (dimensions,) or not np.all(box[0] < box[1]):
-            raise ConfigError(
-                f"box from {shown(lower)} to {shown(upper)}: needs corners of {dimensions} numbers, the lower one first"
-            )
+        box = self._checked_box(lower, upper, self.config.case.space_dimensions)
         if len(times) < 2:
             return np.full(len(lower), np.nan)
         balances = [self._box_balance(self.snapshot(time), box) for time in times]
@@ -432,7 +480,9 @@ class Run:
             Part of the plane to show [D]; all of it if None.
         """
         _plotting().field_style(name)
-        return self._saved(_plotting().field(self.snapshot(time), name, self.spacing, limit=limit, view=view), path)
+        snapshot = self.snapshot(time)
+        figure = _plotting().field(snapshot, name, self.spacing, limit=limit, view=view, title=self._title)
+        return self._saved(figure, path)
 
     def animate(self, name: str = "vorticity", path: str | Path | None = None, **options: Any) -> Path:
         """Make a film of a field from the snapshots.
@@ -461,7 +511,7 @@ class Run:
             check_folder(self.path / "figures")
             (self.path / "figures").mkdir(exist_ok=True)
         target = Path(path) if path is not None else self.path / "figures" / f"{name}.gif"
-        _plotting().animate(self, name, target, said=self._said(), **options)
+        _plotting().animate(self, name, target, title=self._title, said=self._said(), **options)
         return target
 
     def plot_pressure_coefficient(
@@ -489,6 +539,14 @@ class Run:
         if path is not None:
             _plotting().save(figure, path)
         return figure
+
+    @property
+    def _title(self) -> str:
+        """What its pictures are of."""
+        case = self.info.get("case") or shown_name(self.case.get("case"))
+        known = (("Re", self.case.get("reynolds")), (r"$D/\Delta x$", self.case.get("resolution")))
+        numbers = [f"{name} = {value:g}" for name, value in known if isinstance(value, int | float)]
+        return ", ".join([in_figure(str(case).replace("_", " ")), *numbers])
 
     def _said(self) -> str:
         """Return the run's remarks in short, as they stand below its figures."""

@@ -56,7 +56,7 @@ def remarks(case: Case, run: Run) -> list[str]:
 
 def unlike(case: Case, run: Run) -> list[str]:
     """Say in what a run's case or geometry is not that of a case."""
-    if (was := shown_name(run.case.get("case"))) != shown_name(case.reference()):
+    if (was := shown_name(run.case.get("case"))) != shown_name(case.declaration()):
         return [f"its case is {was}"]
     free = Case.model_fields.keys() | set(case.of_the_start)
     own = {name: value for name, value in Config(case).case_tables().items() if name not in {"case", *free}}
@@ -144,7 +144,7 @@ def _same_inflow(config: Config, folder: RunFolder, info: dict[str, Any]) -> boo
 def _stranger(case: Case) -> str:
     """Return a warning if a run folder of this case would be read as one of another class, or of none."""
     known, own = cases.CASES.get(case.name), type(case)
-    if known is own or isinstance(case.reference(), dict):
+    if known is own or isinstance(case.declaration(), dict):
         return ""
     reader = f"takes it for alsph.cases.{known.__name__}" if known else "does not know it"
     return (

@@ -1,4 +1,4 @@
-"""Progress of a run: a live bar on a terminal, a plain line every ten seconds elsewhere."""
+"""Progress of a run: a live bar on a terminal, a line that changes in a notebook, one every ten seconds elsewhere."""
 
 import time as clock
 from contextlib import suppress
@@ -12,7 +12,7 @@ from rich.text import Text
 
 from alsph.text import duration
 
-PLAIN_SECONDS = 10.0
+PLAIN_SECONDS, NOTEBOOK_SECONDS = 10.0, 0.5
 
 
 class Reporter:
@@ -33,7 +33,12 @@ class Reporter:
         console = Console(highlight=False)
         self._console = console
         self._live: Live | None = None
-        if enabled and (console.is_terminal or console.is_jupyter):
+        self._line: Any = None
+        if enabled and console.is_jupyter:  # where rich would need ipywidgets
+            from IPython.display import display
+
+            self._line = display({"text/plain": "started"}, raw=True, display_id=True)  # type: ignore[no-untyped-call]
+        elif enabled and console.is_terminal:
             rate = TextColumn("{task.description}  ETA")
             self._bar = Progress(BarColumn(), TaskProgressColumn(), rate, TimeRemainingColumn(), console=console)
             self._task = self._bar.add_task("", total=until)
@@ -77,15 +82,19 @@ class Reporter:
         self._steps += len(rows["step"])
         time, seconds = float(rows["time"][-1]), now - self._start
         rate = f"{self._steps / seconds:.1f} steps/s" if seconds > 0 else ""
+        pause = NOTEBOOK_SECONDS if self._line else PLAIN_SECONDS
         if self._live:
             self._bar.update(self._task, completed=min(time, self._until), description=rate)
             self._live.update(Group(self._bar, Text(physics_line(rows))))
-        elif now - self._last_line >= PLAIN_SECONDS:
+        elif now - self._last_line >= pause or (self._line and time >= self._until):
             self._last_line = now
             done = (time - self._first_time) / (self._until - self._first_time)
             left = duration(seconds * (1 / done - 1)) if done > 0 else "?"
-            line = f"{100 * time / self._until:5.1f} %  {rate}  ETA {left}  {physics_line(rows)}"
-            self._console.print(line, markup=False, soft_wrap=True)
+            line = f"{100 * min(1.0, time / self._until):5.1f} %  {rate}  ETA {left}  {physics_line(rows)}"
+            if self._line:
+                self._line.update({"text/plain": line}, raw=True)
+            else:
+                self._console.print(line, markup=False, soft_wrap=True)
 
 
 def physics_line(rows: dict[str, Any]) -> str:
