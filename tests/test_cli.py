@@ -29,6 +29,19 @@ def test_end_to_end(alsph, tmp_path, small_options):
         assert str(run / "figures" / f"{name}.png") in stdout
         assert (run / "figures" / f"{name}.png").stat().st_size > 1000
 
+    code, stdout, _ = alsph("animate", run, "--field", "pressure", "--fps", 5)
+    assert (code, stdout) == (0, f"{run / 'figures' / 'pressure.gif'}\n")
+    code, _, stderr = alsph("animate", run, "--start", 0.15)
+    assert code == 2 and "a film needs two snapshots or more, and there are 1" in stderr
+
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / "run.json").write_text("{")
+    code, stdout, _ = alsph("runs", tmp_path)
+    assert code == 0 and [line.split("|")[1].strip() for line in stdout.splitlines()[2:]] == ["bad", "run"]
+    assert "case.toml is missing" in stdout and "| cylinder | 150 | 8    | finished" in stdout
+    code, _, stderr = alsph("runs", run / "figures")
+    assert code == 2 and "holds no run folder" in stderr
+
     assert alsph("plot", run, "-o", tmp_path / "elsewhere" / "figures")[0] == 0
     assert (tmp_path / "elsewhere" / "figures" / "forces.png").exists()
     code, stdout, stderr = alsph("plot", run, "--field", "vortcity")

@@ -1,4 +1,4 @@
-"""The command line: ``alsph run | resume | repeat | describe | plot | info | validate | study | autotune | converge``.
+"""The command line: ``alsph run | resume | repeat | describe | plot | info | validate | study | ...``.
 
 The options of ``run`` and ``describe`` are the fields of the case and of :class:`alsph.config.RunSettings`.
 """
@@ -18,6 +18,7 @@ COMMANDS = {
     "cases": ("of_cases", "List the cases."),
     "describe": ("of_cases", "Tell beforehand what a run will take."),
     "run": ("of_cases", "Run a case, or a file, into a run folder."),
+    "runs": ("runs", "List the run folders in a folder."),
     "resume": ("runs", "Go on with a run from its newest sound checkpoint."),
     "repeat": ("runs", "Repeat a run from its start, without writing anything, and compare it bit by bit."),
     "info": ("runs", "Tell the state and the results of a run."),

@@ -10,13 +10,16 @@ from rich.console import Console
 from rich.progress import Progress
 
 from alsph import plotting
+from alsph.cases.source import shown_name
 from alsph.cli.options import Retry, RunPath, Threads, Walltime
 from alsph.cli.terminal import complain, exit_codes, say, say_table
+from alsph.errors import RunFolderError
 from alsph.folder.durable import check_folder
 from alsph.results.run import Run
 from alsph.running.control import seconds_of
 from alsph.running.repetition import repeat
 from alsph.running.start import resume
+from alsph.tables import markdown
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None)
 
@@ -51,6 +54,36 @@ def _repeat(path: RunPath, threads: Threads = None) -> None:
 def _info(path: RunPath) -> None:
     """Tell the state and the results of a run."""
     say_run(Run(path))
+
+
+@app.command("runs")
+@exit_codes()
+def _runs(
+    folder: Annotated[Path, typer.Argument(metavar="[FOLDER]", help="where to look, in folders of it, too")] = Path(
+        "runs"
+    ),
+) -> None:
+    """List the run folders in a folder: what each is of, how far it is, and the room that it takes."""
+    if not folder.is_dir():
+        raise RunFolderError(f"{folder}: no such folder")
+    rows = [_row(path.parent, folder) for path in sorted(folder.rglob("run.json"))]
+    if not rows:
+        raise RunFolderError(f"{folder}: holds no run folder")
+    say(markdown(("run folder", "case", "Re", "D/Δx", "status", "t*", "of", "MiB"), rows))
+
+
+def _row(path: Path, above: Path) -> list[str]:
+    """Return what is to be told of a run folder, or what is wrong with it."""
+    name = str(path.relative_to(above))
+    try:
+        run = Run(path)
+    except RunFolderError as error:
+        return [name, "", "", "", str(error).removeprefix(f"{path}: "), "", "", ""]
+    case = run.info.get("case", shown_name(run.case.get("case")))
+    size = sum(file.stat().st_size for file in path.iterdir() if file.is_file())
+    found = [run.case.get("reynolds"), run.case.get("resolution"), run.info.get("time"), run.info.get("until")]
+    numbers = [f"{number:.5g}" if isinstance(number, int | float) else "" for number in found]
+    return [name, str(case), *numbers[:2], run.status, *numbers[2:], f"{size / 2**20:.1f}"]
 
 
 @app.command("plot")
