@@ -45,7 +45,7 @@ wheel: $(ENVIRONMENT)  ## A wheel for every Linux of this machine's kind with gl
 bench:
 	cargo bench
 
-mutants-python: $(EXTENSION) $(MUTMUT)  ## Faults put into the Python code one at a time, an hour or more.
+mutants-python: $(EXTENSION) $(TOOLS) $(MUTMUT)  ## Faults put into the Python code one at a time, an hour or more.
 	$(MUTMUT)/bin/python benches/mutants.py $(MUTANTS)
 
 $(MUTMUT):  ## An environment of its own that sees the packages of .venv.

@@ -10,7 +10,8 @@ mod common;
 
 /// The cubic spline (Monaghan 1992).
 struct Cubic {
-    factor: f64,
+    /// What its integrals in 1-D to 3-D are.
+    integrals: [f64; 3],
 }
 
 impl CustomKernel for Cubic {
@@ -19,7 +20,7 @@ impl CustomKernel for Cubic {
     }
 
     fn factor(&self, dimensions: usize) -> f64 {
-        self.factor * [1.0 / 6.0, 5.0 / (14.0 * PI), 1.0 / (4.0 * PI)][dimensions - 1]
+        self.integrals[dimensions - 1] * [1.0 / 6.0, 5.0 / (14.0 * PI), 1.0 / (4.0 * PI)][dimensions - 1]
     }
 
     fn value(&self, q: f64) -> f64 {
@@ -76,14 +77,20 @@ fn a_copy_of_one_of_the_engines_gives_the_same_flow() {
 
 #[test]
 fn a_kernel_of_the_callers_carries_a_flow() {
-    let (energy, divergence) = vortices(KernelKind::Custom(Custom(&Cubic { factor: 1.0 })));
+    let (energy, divergence) = vortices(KernelKind::Custom(Custom(&Cubic { integrals: [1.0; 3] })));
     assert_relative_eq!(energy, 0.25 * (-16.0 * PI * PI * 0.01 * 0.2_f64).exp(), max_relative = 0.02);
     assert!(divergence < 0.05, "{divergence}");
 }
 
 #[test]
-fn what_is_no_kernel_is_refused() {
-    let wrong = settings(KernelKind::Custom(Custom(&Cubic { factor: 1.1 })));
-    let error = Simulation::new(wrong, common::taylor_green(32, 0.0), Clock::default(), Some(1)).err().expect("refused");
-    assert!(error.to_string().contains("integral in 2-D must be 1, not 1.1"), "{error}");
+fn what_is_no_kernel_is_refused_on_surfaces_too() {
+    for (kernel, message) in [
+        (&Cubic { integrals: [1.0, 1.1, 1.0] }, "integral in 2-D must be 1"),
+        (&Cubic { integrals: [0.9, 1.0, 1.0] }, "integral in 1-D must be 1"),
+    ] {
+        let wrong = settings(KernelKind::Custom(Custom(kernel)));
+        let refused = Simulation::new(wrong, common::taylor_green(32, 0.0), Clock::default(), Some(1)).err();
+        let error = refused.expect("refused").to_string();
+        assert!(error.contains(message), "{error}");
+    }
 }

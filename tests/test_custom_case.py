@@ -6,6 +6,8 @@ import subprocess
 import sys
 
 import pytest
+from alsph import cases, config, open_run
+from alsph.errors import ConfigError
 
 HEATED = '''
 from typing import ClassVar
@@ -107,7 +109,7 @@ def test_a_case_of_anothers_is_one_of_alsphs(command, tmp_path, name, recorded):
 @pytest.mark.parametrize(
     ("text", "name", "told"),
     [
-        (None, "", "my_cases.py: cannot be read (No such file or directory)"),
+        (None, "", "'my_cases.py': cannot be read (No such file or directory)"),
         (HEATED, ":Hot", "my_cases.py: has no case 'Hot'; known: Heated"),
         (HEATED, ":Stranger", "my_cases.py: has no case 'Stranger'"),
         ("x = (", "", "my_cases.py: line 1: '(' was never closed"),
@@ -132,14 +134,114 @@ def test_what_is_wrong_with_a_file_is_told(command, tmp_path, text, name, told):
     assert "Traceback" not in done.stderr and not (tmp_path / "runs").exists()
 
 
-def test_a_file_may_import_what_lies_beside_it(command, tmp_path):
+def test_a_file_stands_alone_and_says_so(command, tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "helper.py").write_text("")
     (tmp_path / "mine" / "my_cases.py").write_text("import helper" + HEATED)
-    run = command("run", "mine/my_cases.py", "--resolution", 8, "--until", 0.02, "-o", "run", cases=())
-    assert run.returncode == 0, run.stderr
-    done = command("info", "run", cases=())
-    assert "No module named 'helper'; a run folder holds my_cases.py alone: set PYTHONPATH to where" in done.stderr
+    done = command("run", "mine/my_cases.py", "--resolution", 8, "--until", 0.02, "-o", "run", cases=())
+    assert done.returncode == 2 and "No module named 'helper'; a run holds my_cases.py alone" in done.stderr
+
+
+FIELD = '    heat: float = Field(default=1.0, gt=0, description="how hot it is [-]")\n'
+
+
+@pytest.mark.parametrize(
+    ("field", "told"),
+    [
+        (
+            "    sides: tuple[float, float] = (1.0, 2.0)\n",
+            "sides = (1.0, 2.0): a parameter of Heated that its file cannot",
+        ),
+        ("    path: Path = Path('x')\n", "path = PosixPath('x'): a parameter of Heated that its file cannot give back"),
+        ("    force: float = 1.0\n", "Heated: its parameter 'force' has the name of an option; give it another one"),
+        ("    threads: int = 1\n", "Heated: its parameter 'threads' has the name of an option"),
+        ("    case: int = 1\n", "Heated: its parameter 'case' has the name of an option"),
+        (FIELD + "    def domain(self):\n        return 1 / 0\n", "ZeroDivisionError"),
+        (FIELD + "    @model_validator(mode='after')\n    def ok(self):\n        self.hat\n", "my_cases.py: line"),
+        ("    heat: Unknown\n", "name 'Unknown' is not defined"),
+    ],
+)
+def test_what_a_case_cannot_do_is_told_before_anything_is_written(command, tmp_path, field, told):
+    text = HEATED.replace(FIELD, field).replace(
+        "import Field", "import Field, model_validator\nfrom pathlib import Path"
+    )
+    assert text != HEATED
+    (tmp_path / "my_cases.py").write_text(text)
+    done = command("run", "my_cases.py", "--resolution", 8, "--until", 0.02, cases=())
+    assert done.returncode != 0 and told in done.stderr, done.stderr
+    assert not (tmp_path / "runs").exists()
+
+
+def test_parameters_that_must_be_given(command, tmp_path):
+    (tmp_path / "my_cases.py").write_text(HEATED.replace("default=1.0, ", ""))
+    assert "how hot it is" in command("run", "my_cases.py", "--help", cases=()).stdout
+    done = command("run", "my_cases.py", "--resolution", 8, "--until", 0.02, cases=())
+    assert done.returncode == 2 and "heat: is missing" in done.stderr
+    done = command("run", "my_cases.py", "--resolution", 8, "--until", 0.02, "--heat", 2, cases=())
+    assert done.returncode == 0, done.stderr
+    (tmp_path / "case.toml").write_text('case = "my_cases.py"\nheat = 2.0\nresolution = 8\n')
+    assert command("describe", "case.toml", "--no-probe", cases=()).returncode == 0
+
+
+@pytest.mark.parametrize("text", ["import sys\nsys.exit()\n", "raise SystemExit(3)\n"])
+def test_a_file_that_ends_the_process_is_told(command, tmp_path, text):
+    (tmp_path / "my_cases.py").write_text(text)
+    done = command("run", "my_cases.py", cases=())
+    assert done.returncode == 2 and "SystemExit" in done.stderr
+
+
+def test_lines_may_end_in_any_way(command, tmp_path):
+    (tmp_path / "my_cases.py").write_bytes(b"\xef\xbb\xbf" + HEATED.replace("\n", "\r\r\n").encode())
+    run = command("run", "my_cases.py", "--resolution", 8, "--until", 0.02, "-o", "run", cases=())
+    assert run.returncode == 0 and command("resume", "run", "--until", 0.04, cases=()).returncode == 0
+
+
+def test_what_classes_of_a_file_are_cases(tmp_path):
+    text = HEATED.replace('    name: ClassVar[str] = "heated"\n', "").replace(
+        '    title: ClassVar[str] = "vortices of another package"\n', ""
+    )
+    more = "class _Common(TaylorGreen): ...\nOld = Heated\nclass TGVortex2D(_Common): ...\n"
+    (tmp_path / "my_cases.py").write_text(text + more)
+    found = cases.find("my_cases.py:TGVortex2D", tmp_path)
+    assert (found.name, found.title) == ("tg_vortex2d", "tg_vortex2d")
+    found = cases.find("my_cases.py:Heated", tmp_path)
+    assert (found.name, found.title) == ("heated", "vortices of another package")
+    with pytest.raises(ConfigError, match="has the cases Heated, TGVortex2D; say which"):
+        cases.find("my_cases.py", tmp_path)
+    with pytest.raises(ConfigError, match="has no case 'Old'"):
+        cases.find("my_cases.py:Old", tmp_path)
+
+
+def test_a_folder_stays_readable_when_its_name_is_taken(tmp_path, monkeypatch):
+    (tmp_path / "my_cases.py").write_text(HEATED)
+    run = cases.find("my_cases.py", tmp_path)(resolution=8).run(tmp_path / "run", until=0.02, progress=False)
+    monkeypatch.setitem(cases.CASES, "heated", cases.TaylorGreen)
+    assert open_run(run.path).config.case == run.config.case
+
+
+def test_another_text_is_another_flow(tmp_path):
+    (tmp_path / "my_cases.py").write_text(HEATED)
+    run = cases.find("my_cases.py", tmp_path)(resolution=8).run(tmp_path / "run", until=0.02, progress=False)
+    (tmp_path / "my_cases.py").write_text(HEATED + "\n# edited\n")
+    other = cases.find("my_cases.py", tmp_path)(resolution=8)
+    with pytest.warns(RuntimeWarning, match="its case is my_cases.py:Heated as another text of that file has it"):
+        other.simulation(initial_run=run.path)
+
+
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        ({"self": 1}, "case.self: unknown; the table of a case has file, name, sha256, text"),
+        ({"file": "a.py", "name": "", "sha256": "", "text": ""}, "case.name = '': must not be empty"),
+        ({"file": 3, "name": "A", "sha256": "", "text": ""}, "case.file = 3: must be a text"),
+        ({"name": "A"}, "case.file: is missing"),
+        ("a\0.py", "cannot be read|not a Python file"),
+        (300 * "a" + ".py", "cannot be read"),
+    ],
+)
+def test_hostile_declarations_are_refused(table, told):
+    with pytest.raises(ConfigError, match=told):
+        config.from_tables({"case": table})
 
 
 def test_a_run_folder_whose_case_was_changed_is_refused(command, tmp_path):

@@ -42,9 +42,11 @@ def test_points_are_single_ones_and_lines():
         ("6,1,2", "is no point"),
         ("a,b", "is no point"),
         ("nan,1", "is no point"),
-        ([[1, 2], [3]], "is no point"),
+        ([[1, 2], [3]], "must be a text such as"),
         ("0,0:1,1", "is no line"),
         ("0,0:1,1:1", "is no line"),
+        ("0,0:1,1:" + 5000 * "9", "is no line"),
+        (5, "must be a text such as"),
         ("0,0:1:3", "is no point"),
         ("0,0:1,1:3:4", "is no line"),
         ("0,0:1,1:6000 0,0:1,1:6000", "more than 10000 points"),
@@ -71,12 +73,12 @@ def test_snapshots_give_the_same_at_the_same_time(vortices):
     time = vortices.times[-1]
     record = int(np.abs(vortices.probes.time - time).argmin())
     assert vortices.probes.time[record] == time
-    inner = vortices.probes.position[2:-1]  # the snapshot does not know of the other side of the period
-    found = vortices.sample(inner, time)
-    assert found["velocity"] == pytest.approx(vortices.probes.velocity[record, 2:-1], abs=2e-3)
-    assert found["pressure"] == pytest.approx(vortices.probes.pressure[record, 2:-1], abs=0.02)
-    gradient = found["velocity_gradient"]
-    x, y = 2 * np.pi * inner.T
+    found = vortices.sample(vortices.probes.position, time)
+    assert found["velocity"] == pytest.approx(vortices.probes.velocity[record], abs=2e-3)
+    assert found["pressure"] == pytest.approx(vortices.probes.pressure[record], abs=0.02)
+    edges = np.array([[0.03, 0.25], [0.999, 0.4], [0.5, 0.0], [0.25, 1.0], [0.0, 0.0], [1.25, -0.4]])  # periodic
+    gradient = vortices.sample(edges, time)["velocity_gradient"]
+    x, y = 2 * np.pi * edges.T
     decay = np.exp(-8 * np.pi**2 * 0.01 * time)
     assert gradient[:, 0, 0] == pytest.approx(2 * np.pi * np.sin(x) * np.sin(y) * decay, abs=0.15)
     assert np.trace(gradient, axis1=1, axis2=2) == pytest.approx(0, abs=0.2)
@@ -89,6 +91,18 @@ def test_probes_of_a_resumed_run_are_those_of_a_whole_one(tmp_path):
     part = alsph.resume(tmp_path / "part", until=0.4, progress=False)
     for name in ("time", "velocity", "pressure"):
         assert np.array_equal(getattr(whole.probes, name), getattr(part.probes, name))
+
+
+def test_points_of_numpy_are_points(tmp_path):
+    across = np.stack([np.full(3, 0.5), np.linspace(0.2, 0.8, 3)], axis=1)
+    run = TaylorGreen(resolution=8).run(tmp_path / "run", until=0.1, probes=across, progress=False)
+    assert np.array_equal(run.probes.position, across) and run.config.run.probes == across.tolist()
+
+
+def test_outside_of_the_domain_there_is_nothing(tmp_path):
+    run = Body(resolution=10, length=5, height=4, upstream=2).run(tmp_path / "run", until=0.05, progress=False)
+    assert np.isnan(run.sample([[5.04, 0.0], [3.0, 2.01]])["velocity"]).all()
+    assert np.isfinite(run.sample([[5.0, 0.0], [3.0, 2.0]])["velocity"]).all()
 
 
 def test_inside_a_body_there_is_nothing(tmp_path):
@@ -138,6 +152,8 @@ def test_a_film_has_a_picture_of_each_snapshot(vortices, tmp_path):
     [
         ({"path": "film.png"}, "a film ends in .gif, .mp4 or .webm"),
         ({"every": 0}, "every = 0"),
+        ({"fps": "a"}, "fps = 'a': must be a number"),
+        ({"start": "a"}, "start = 'a': must be a number"),
         ({"fps": 1e9}, "fps = 1e"),
         ({"start": 0.19}, "needs two snapshots or more, and there are 1"),
         ({"name": "colour"}, "unknown field 'colour'"),
@@ -149,6 +165,18 @@ def test_what_is_wrong_with_a_film_is_told(vortices, tmp_path, monkeypatch, opti
     with pytest.raises(ConfigError, match=message):
         vortices.animate(**{"path": "film.gif"} | options)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("kind", ["mp4", "WEBM"])
+def test_a_film_may_be_a_video(vortices, tmp_path, kind):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    film = vortices.animate(path=tmp_path / f"film.{kind}", every=np.int64(2), fps=25)
+    assert ffmpeg.count_frames_and_secs(str(film))[0] == 3
+
+
+def test_a_gif_says_what_it_cannot_play(vortices, tmp_path):
+    with pytest.warns(UserWarning, match="33.3 a second"):
+        vortices.animate(path=tmp_path / "film.gif", fps=30, every=3)
 
 
 def test_a_video_needs_a_library(vortices, tmp_path, monkeypatch):
@@ -181,6 +209,8 @@ def test_a_snapshot_is_a_grid(vortices, tmp_path):
     ("options", "message"),
     [
         ({"spacing": 0.0}, "spacing = 0.0"),
+        ({"spacing": 10**400}, "spacing = 1000"),
+        ({"lower": "ab"}, "box from 'ab'"),
         ({"spacing": 1e-12}, "more than 20,000,000 points"),
         ({"lower": (1, 1)}, "the lower one first"),
     ],

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import tomli_w
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from alsph import cases
 from alsph.analysis.probes import points
@@ -27,6 +27,10 @@ MOST_BYTES = 2**22
 """Of a configuration file."""
 
 LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:"[^"\n]*"|'[^'\n]*'|[\w-]+)[ \t]*\.[ \t]*){99}""")
+
+
+KEPT = (str, bool, int, float, list, dict, Parameters, type(None))
+"""Kinds of parameters that a configuration file gives back."""
 
 
 class RunSettings(Parameters):
@@ -46,6 +50,20 @@ class RunSettings(Parameters):
         default=None,
         description="points where velocity and pressure are recorded, and lines of them: 'X,Y; X,Y:X,Y:COUNT' [D]",
     )
+
+    @field_validator("probes", mode="before")
+    @classmethod
+    def _plain(cls, probes: Any) -> Any:
+        if probes is None or isinstance(probes, str):
+            return probes
+        try:
+            found = np.array(probes, float)
+        except (TypeError, ValueError):
+            found = np.empty(0)
+        if found.ndim != 2:
+            raise ValueError("must be a text such as '6,0; 5,-1:5,1:21', or a list of points")
+        return found.tolist()
+
     probe_interval: float | None = Field(
         default=None, gt=0, description="time between two records of the probes, 0.05 if not given [D/U]"
     )
@@ -107,6 +125,29 @@ class Config:
         values = {name: values[name] for name in self.case.parameter_names()}
         return {"case": self.case.declaration()} | {name: value for name, value in values.items() if value is not None}
 
+    def check(self) -> None:
+        """Refuse parameters that a file cannot give back, and probes outside of the domain.
+
+        Raises
+        ------
+        ConfigError
+            If there are some; the message names them.
+        """
+        kind, own = type(self.case), self.case.parameter_names()
+        if wrong := [name for name in own if name in ("case", "run") or name in RunSettings.model_fields]:
+            raise ConfigError(f"{wrong[0]}: a setting of the run; a parameter of {kind.__name__} needs another name")
+        table = {name: value for name, value in self.case_tables().items() if name != "case"}
+        try:
+            kept = kind(**tomllib.loads(tomli_w.dumps(table))) == self.case
+        except (ConfigError, TypeError, ValueError):
+            kept = False
+        if not kept:
+            values = {name: getattr(self.case, name) for name in own}
+            odd = [name for name, value in values.items() if not isinstance(value, KEPT)] or list(table)
+            told = f"{odd[0]} = {shown(values[odd[0]])}: a parameter of {kind.__name__} that its file cannot give back"
+            raise ConfigError(f"{told}; use numbers, texts, true or false, and lists of them")
+        _ = self.probes
+
     def text(self) -> str:
         """Return the configuration with all its parameters as TOML."""
         return tomli_w.dumps(self.tables(), multiline_strings=True)
@@ -158,6 +199,10 @@ def _made(kind: type[Set], values: dict[str, Any], prefix: str, mistakes: list[s
         return kind(**values)
     except ConfigError as error:
         mistakes += [f"{prefix}{mistake}" for mistake in error.mistakes]
+    except Exception as error:  # in the user's own code
+        if not (code := vars(kind).get("code")):
+            raise
+        mistakes.append(f"{code.file}: {cases.source.reason(error, code.file)}")
     return None
 
 

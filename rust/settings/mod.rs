@@ -166,7 +166,9 @@ impl Settings {
         if self.search_every_iteration && self.derivative_frame != DerivativeFrame::Updated {
             return Err(setting("search_every_iteration", "needs derivative_frame = \"updated\""));
         }
+        // On surfaces, too.
         self.kernel.validate(self.dimensions)?;
+        self.kernel.validate(self.dimensions - 1)?;
         self.validate_scheme()?;
         domain::validate_vector("body_force", &self.body_force, self.dimensions)?;
         domain::validate_bodies(&self.bodies, self.dimensions)?;

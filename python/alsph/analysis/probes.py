@@ -63,7 +63,7 @@ def _line(text: str, dimensions: int) -> FloatArray:
     first = _numbers(start.split(","), dimensions, text)
     if not rest:
         return first[None]
-    if len(rest) != 2 or not rest[1].isdecimal() or not 2 <= int(rest[1]) <= MOST_POINTS:
+    if len(rest) != 2 or not re.fullmatch("[0-9]{1,5}", rest[1]) or not 2 <= int(rest[1]) <= MOST_POINTS:
         raise ConfigError(f"run.probes: {shown(text)} is no line, which is X,Y:X,Y:COUNT from one point to another")
     return np.linspace(first, _numbers(rest[0].split(","), dimensions, text), int(rest[1]))
 

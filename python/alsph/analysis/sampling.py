@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from alsph.geometry.particles import Kind, Snapshot, neighbour_tree
 NEIGHBOURS_PER_DIMENSION = 8
 SINGULAR = 1e-5  # directions that the neighbours determine less well than this are left out of a fit
 CHUNK = 50_000  # points that fields are interpolated to at a time
+REACH = 4.0  # Δx beyond a periodic side that particles are continued to, farther than fits reach
 VOID = 1.5  # points further than this many Δx from every particle have no value
 
 
@@ -62,18 +63,22 @@ def checked_points(points: ArrayLike, dimensions: int) -> FloatArray:
     return found
 
 
-def at(snapshot: Snapshot, points: FloatArray, spacing: float) -> dict[str, FloatArray]:
-    """Return velocity and pressure of the fluid of a snapshot, and their gradients, at points (m, d).
+def at(snapshot: Snapshot, points: FloatArray, spacing: float, domain: Mapping[str, Any]) -> dict[str, FloatArray]:
+    """Return velocity and pressure of the fluid of a snapshot, and their gradients, at points (m, d) of a domain.
 
     See :meth:`alsph.Run.sample`.
     """
     fluid = snapshot.fluid
-    position = snapshot.position[fluid]
     fields = np.column_stack([snapshot.velocity[fluid], snapshot.pressure[fluid]])
+    lower, upper = np.array(domain["lower"]), np.array(domain["upper"])
+    periodic = np.array(["periodic" in pair for pair in domain["boundaries"]])
+    points = np.where(periodic, lower + (points - lower) % (upper - lower), points)
+    position, fields = _with_images(snapshot.position[fluid], fields, lower, upper, periodic, REACH * spacing)
     parts = [points[first : first + CHUNK] for first in range(0, max(len(points), 1), CHUNK)]
     found = [interpolate(position, fields, part, spacing) for part in parts]
     values, gradients = (np.concatenate(each) for each in zip(*found, strict=True))
-    void = neighbour_tree(position).query(points)[0] > VOID * spacing
+    outside = (points < lower - 1e-9 * spacing) | (points > upper + 1e-9 * spacing)
+    void = outside.any(axis=1) | (neighbour_tree(position).query(points)[0] > VOID * spacing)
     values[void], gradients[void] = np.nan, np.nan
     return {
         "velocity": values[:, :-1],
@@ -81,6 +86,20 @@ def at(snapshot: Snapshot, points: FloatArray, spacing: float) -> dict[str, Floa
         "velocity_gradient": gradients[:, :-1],
         "pressure_gradient": gradients[:, -1],
     }
+
+
+def _with_images(
+    position: FloatArray, fields: FloatArray, lower: FloatArray, upper: FloatArray, periodic: FloatArray, reach: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return particles with the images of those near the periodic sides of a box."""
+    for axis in np.flatnonzero(periodic):
+        shift = np.zeros_like(lower)
+        shift[axis] = upper[axis] - lower[axis]
+        along = position[:, axis]
+        near = [along < lower[axis] + reach, along > upper[axis] - reach]
+        position = np.concatenate([position, position[near[0]] + shift, position[near[1]] - shift])
+        fields = np.concatenate([fields, fields[near[0]], fields[near[1]]])
+    return position, fields
 
 
 def interpolate(

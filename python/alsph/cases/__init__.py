@@ -82,8 +82,10 @@ def find(name: str | dict[str, Any], *folders: Path) -> type[Case]:
     ConfigError
         If there is none, or its file cannot be run.
     """
-    if isinstance(name, dict) or source.is_reference(name):
-        model = source.Source(**name).model() if isinstance(name, dict) else source.read(name, *folders)
+    if isinstance(name, dict):
+        return source.Source.of(name).model()
+    if source.is_reference(name):
+        model = source.read(name, *folders)
         if model.name in CASES:
             told = (
                 f"{source.shown_name(model.declaration())}: its name, '{model.name}', is that of a case which is there"

@@ -46,8 +46,9 @@ class Body(Bodies):
     @classmethod
     def _read(cls, shape: Any) -> str | Outline:
         if isinstance(shape, str) and is_name(shape):
+            match = NAME.fullmatch(shape)
             named(shape)
-            return shape
+            return f"naca{match[1]}" if match else shape
         if isinstance(shape, dict):
             return Outline(**shape)
         if isinstance(shape, str | os.PathLike):

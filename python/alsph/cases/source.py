@@ -5,19 +5,20 @@ from __future__ import annotations
 import hashlib
 import inspect
 import linecache
+import os
 import re
 import sys
 import traceback
 from pathlib import Path
 from types import ModuleType
-from typing import Self
+from typing import Any, Self
 
 from pydantic import Field, model_validator
 
 from alsph.cases.base import Case
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters, suggest
-from alsph.text import contents
+from alsph.text import contents, shown
 
 LARGEST_FILE = 2**20
 """Size of the largest file that is read [bytes]."""
@@ -26,11 +27,18 @@ REFERENCE = re.compile(r"(?P<path>.+\.py)(:(?P<name>[^\W\d]\w*))?")
 """How such a case is asked for."""
 
 
+NEWLINE = re.compile("\r+\n?")
+"""Ends of lines of other systems, which a case.toml does not keep."""
+
+WORD = re.compile(r"(?<=[a-z0-9])(?=[A-Z][a-z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[a-z])(?=[A-Z])")
+"""Where a new word begins in the name of a class."""
+
+
 class Source(Parameters):
     """A case class and the Python file that it stands in. A run folder holds them, and so needs no file beside it."""
 
     file: str = Field(description="name of the file")
-    name: str = Field(description="name of the class")
+    name: str = Field(min_length=1, description="name of the class")
     sha256: str = Field(description="SHA-256 of the text")
     text: str = Field(description="what stands in the file")
 
@@ -39,6 +47,22 @@ class Source(Parameters):
         if self.sha256 != _sha256(self.text):
             raise ValueError(f"{self.file}: the text is not that which its sha256 is of")
         return self
+
+    @classmethod
+    def of(cls, table: dict[str, Any]) -> Self:
+        """Return the source of a table of a configuration.
+
+        Raises
+        ------
+        ConfigError
+            If it is none.
+        """
+        if unknown := table.keys() - cls.model_fields:
+            raise ConfigError(f"case.{min(unknown)}: unknown; the table of a case has {', '.join(cls.model_fields)}")
+        try:
+            return cls(**table)
+        except ConfigError as error:
+            raise ConfigError(*(f"case.{mistake}" for mistake in error.mistakes)) from None
 
     def model(self) -> type[Case]:
         """Run the file, if that has not been done, and return the class.
@@ -79,26 +103,19 @@ def read(name: str, *folders: Path) -> type[Case]:
     match = REFERENCE.fullmatch(name)
     assert match
     paths = [folder / match["path"] for folder in folders or (Path(),)]
-    path = next((path for path in paths if path.is_file()), paths[0])
+    path = next((path for path in paths if os.path.isfile(path)), paths[0])
     try:
-        text = contents(path, LARGEST_FILE).decode("utf-8-sig").replace("\r\n", "\n")
+        text = NEWLINE.sub("\n", contents(path, LARGEST_FILE).decode("utf-8-sig"))
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise ConfigError(f"{path}: not a Python file: it is not text in UTF-8") from None
-    if (folder := str(path.resolve().parent)) not in sys.path:
-        sys.path.append(folder)  # as of a script: it may import what lies beside it
+        raise ConfigError(f"{shown(str(path))}: cannot be read ({error.strerror})") from None
+    except ValueError:
+        raise ConfigError(f"{shown(str(path))}: not a Python file: it is not text in UTF-8") from None
     return _one(match["name"], path.name, text)
 
 
 def _one(name: str | None, file: str, text: str) -> type[Case]:
     """Return the case class of that name in a file, or the only one."""
-    module = _module(file, text)
-    found = {
-        name: value
-        for name, value in vars(module).items()
-        if isinstance(value, type) and issubclass(value, Case) and value.__module__ == module.__name__
-    }
+    found = {model.__name__: model for model in _own(_module(file, text))}
     usable = {name: model for name, model in found.items() if not inspect.isabstract(model)}
     if not usable:
         lacking = [f"{name} lacks {', '.join(sorted(model.__abstractmethods__))}" for name, model in found.items()]
@@ -112,24 +129,31 @@ def _one(name: str | None, file: str, text: str) -> type[Case]:
     return usable[name]
 
 
+def _own(module: ModuleType) -> list[type[Case]]:
+    """Return the case classes that a module defines, without those whose names say that they are of no use alone."""
+    classes = (value for value in vars(module).values() if isinstance(value, type) and issubclass(value, Case))
+    own = (model for model in classes if model.__module__ == module.__name__ and not model.__name__.startswith("_"))
+    return list(dict.fromkeys(own))
+
+
 def _module(file: str, text: str) -> ModuleType:
     """Return the module of a file, which is run once."""
-    name = f"alsph_file_{_sha256(text)[:16]}"
+    name = f"alsph_file_{_sha256(file + text)[:16]}"
     if name in sys.modules:
         return sys.modules[name]
-    module = ModuleType(name)
     # Messages of Python show lines of the text as it was run, whatever the file holds by then.
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-    module.__file__ = file
-    sys.modules[name] = module
+    sys.modules[name] = module = ModuleType(name)
     try:
         exec(compile(text, file, "exec"), vars(module))
-        for own, model in vars(module).copy().items():
-            if isinstance(model, type) and issubclass(model, Case) and model.__module__ == name:
-                _complete(model, Source(file=file, name=own, sha256=_sha256(text), text=text))
-    except Exception as error:
+        for model in _own(module):
+            _complete(model, Source(file=file, name=model.__name__, sha256=_sha256(text), text=text))
+    except (Exception, SystemExit) as error:
         del sys.modules[name]
-        raise ConfigError(f"{file}: {_reason(error, file)}") from None
+        raise ConfigError(f"{file}: {reason(error, file)}") from None
+    except BaseException:
+        del sys.modules[name]
+        raise
     return module
 
 
@@ -137,26 +161,27 @@ def _complete(model: type[Case], source: Source) -> None:
     """Give a class its source and, where it has none of its own, a name and a title."""
     own = vars(model)
     if "name" not in own:
-        model.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", model.__name__).lower()
+        model.name = WORD.sub("_", model.__name__).lower()
     if "title" not in own:
-        first = (model.__doc__ or "").strip().partition("\n")[0].rstrip(".")
+        first = re.split(r"\n|Parameters\n---", (model.__doc__ or "").strip())[0].rstrip(".")
         model.title = first[:1].lower() + first[1:] or model.name
-    if not re.fullmatch(r"[\w-]+", model.name):
+    if not (isinstance(model.name, str) and re.fullmatch(r"[\w-]+", model.name)):
         raise ValueError(f"name = {model.name!r} of {model.__name__}: may hold letters, digits, _ and - only")
+    if not isinstance(model.title, str):
+        raise ValueError(f"title = {model.title!r} of {model.__name__}: must be a text")
+    model.model_rebuild()
     model.code = source
 
 
-def _reason(error: Exception, file: str) -> str:
+def reason(error: BaseException, file: str) -> str:
     """Say where in a file what went wrong."""
     if isinstance(error, SyntaxError):
         return f"line {error.lineno}: {error.msg}"
-    if isinstance(error, ModuleNotFoundError):
-        hint = f"; a run folder holds {file} alone: set PYTHONPATH to where the rest is, or install it"
-    else:
-        hint = ""
+    alone = f"; a run holds {file} alone, put it into that, install it, or set PYTHONPATH to where it is"
+    hint = alone if isinstance(error, ModuleNotFoundError) else ""
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
-    where = f"line {lines[-1]}: " if lines else ""
-    return f"{where}{type(error).__name__}: {error}{hint}"
+    where, first = f"line {lines[-1]}: " if lines else "", str(error).partition("\n")[0]
+    return f"{where}{type(error).__name__}: {first}{hint}"
 
 
 def _sha256(text: str) -> str:

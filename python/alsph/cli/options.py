@@ -13,7 +13,8 @@ from typer.main import get_command
 
 from alsph import cases, config
 from alsph.cli.terminal import exit_codes
-from alsph.config import Config, RunSettings
+from alsph.config import RunSettings
+from alsph.errors import ConfigError
 from alsph.parameters import Parameters, describe_default
 from alsph.text import shown
 
@@ -47,11 +48,20 @@ RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="run folder")]
 def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Callable[..., None]:
     """Return a command for a case: `action` called with the configuration that the options make."""
     own = list(inspect.signature(action).parameters.values())[1:]
+    taken = {parameter.name for parameter in own} | RunSettings.model_fields.keys() | {"context", "case", "run"}
+    if names := sorted(taken & model.model_fields.keys()):
+        raise ConfigError(
+            f"{model.__name__}: its parameter '{names[0]}' has the name of an option; give it another one"
+        )
+    try:
+        until = f"{model().default_until:g}"
+    except Exception:  # parameters that must be given
+        until = "the case's own"
 
     @exit_codes()
     def command(context: typer.Context, **values: Any) -> None:
         extra = {parameter.name: values.pop(parameter.name) for parameter in own}
-        tables = (context.obj or Config(model())).tables()
+        tables: dict[str, Any] = context.obj.tables() if context.obj else {"case": model.declaration(), "run": {}}
         given = {name: value for name, value in values.items() if value is not None}
         for name in cases.method.superseded(given, tables):
             tables.pop(name, None)
@@ -66,9 +76,7 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
         first,
         *keywords,
         *_options(model, model.parameter_names(), {}),
-        *_options(
-            RunSettings, RunSettings.model_fields, {"until": f"{model().default_until:g}", "threads": "all cores"}
-        ),
+        *_options(RunSettings, RunSettings.model_fields, {"until": until, "threads": "all cores"}),
     ]
     functools.update_wrapper(command, action)
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
@@ -94,10 +102,11 @@ class CaseGroup(TyperGroup):
             if cmd_name.endswith(".toml"):
                 ctx.obj = config.load(cmd_name)
             model = type(ctx.obj.case) if ctx.obj else cases.find(cmd_name)
-        app = typer.Typer(add_completion=False, rich_markup_mode=None)
-        text = (model.__doc__ or "").split("\n\nParameters\n")[0]
-        app.command(model.name, help=text, short_help=model.title)(_case_command(model, self.action))
-        return get_command(app)
+            app = typer.Typer(add_completion=False, rich_markup_mode=None)
+            text = (model.__doc__ or "").split("Parameters\n---")[0].strip()
+            app.command(model.name, help=text, short_help=model.title)(_case_command(model, self.action))
+            return get_command(app)
+        raise AssertionError("the block ends in one way or the other")
 
 
 def group_of_cases(action: Callable[..., None]) -> type[CaseGroup]:

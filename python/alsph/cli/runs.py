@@ -2,6 +2,7 @@
 
 import functools
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -80,7 +81,10 @@ def _row(path: Path, above: Path) -> list[str]:
     except RunFolderError as error:
         return [name, "", "", "", str(error).removeprefix(f"{path}: "), "", "", ""]
     case = run.info.get("case", shown_name(run.case.get("case")))
-    size = sum(file.stat().st_size for file in path.iterdir() if file.is_file())
+    size = 0
+    for file in path.iterdir():
+        with suppress(OSError):  # of a run that goes on
+            size += file.stat().st_size
     found = [run.case.get("reynolds"), run.case.get("resolution"), run.info.get("time"), run.info.get("until")]
     numbers = [f"{number:.5g}" if isinstance(number, int | float) else "" for number in found]
     return [name, str(case), *numbers[:2], run.status, *numbers[2:], f"{size / 2**20:.1f}"]
@@ -136,7 +140,7 @@ def _animate(
     start: Annotated[float | None, typer.Option(help="time to start at [D/U]", show_default="the first")] = None,
     end: Annotated[float | None, typer.Option(help="time to end at [D/U]", show_default="the last")] = None,
     every: Annotated[int, typer.Option(help="take one snapshot of so many")] = 1,
-    fps: Annotated[float, typer.Option(help="pictures a second")] = 12.0,
+    fps: Annotated[float, typer.Option(help="pictures a second")] = 10.0,
     limit: Annotated[float | None, typer.Option(help="end of the colour scale", show_default="from the fields")] = None,
     output: Annotated[
         Path | None,

@@ -7,7 +7,7 @@ import shapely
 
 from alsph.arrays import FloatArray
 
-NAME = re.compile(r"naca[ _-]?(\d{4,5})", re.IGNORECASE)
+NAME = re.compile(r"naca[ _-]?([0-9]{4,5})", re.IGNORECASE)
 
 THICKNESS = np.array([0.2969, -0.1260, -0.3516, 0.2843, -0.1036])
 """Coefficients of √x, x, x², x³ and x⁴; the last one closes the trailing edge (−0.1015 leaves it open)."""

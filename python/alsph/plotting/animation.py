@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,13 +16,14 @@ from alsph.errors import ConfigError
 from alsph.folder.durable import check_target, replacing
 from alsph.plotting import pictures
 from alsph.plotting.style import remark
+from alsph.text import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Frame = NDArray[np.uint8]
 
-VIDEO = (".mp4", ".webm")
+GIF, VIDEO = ".gif", (".mp4", ".webm")
 DPI = 100
 SCALED_BY = 5
 """Number of snapshots, evenly over the film, that the colour scale is made for."""
@@ -35,7 +37,7 @@ def animate(
     start: float = -np.inf,
     end: float = np.inf,
     every: int = 1,
-    fps: float = 12.0,
+    fps: float = 10.0,
     limit: float | None = None,
     view: tuple[float, float, float, float] | None = None,
     title: str = "",
@@ -47,14 +49,20 @@ def animate(
     `title` stands above each picture and `said` below; `progress` is called with the number of pictures that are done,
     and of all.
     """
-    if not (isinstance(every, int) and every >= 1):
-        raise ConfigError(f"every = {every!r}: must be a whole number above zero")
+    numbers = {"start": start, "end": end, "every": every, "fps": fps}
+    if wrong := [what for what, value in numbers.items() if not isinstance(value, int | float | np.number)]:
+        raise ConfigError(f"{wrong[0]} = {shown(numbers[wrong[0]])}: must be a number")
+    if every < 1 or every != int(every):
+        raise ConfigError(f"every = {every:g}: must be a whole number above zero")
     if not 0.1 <= fps <= 100:
         raise ConfigError(f"fps = {fps:g}: must lie between 0.1 and 100 pictures a second")
-    if path.suffix.lower() not in (".gif", *VIDEO):
+    kind = path.suffix.lower()
+    if kind not in (GIF, *VIDEO):
         raise ConfigError(f"{path}: a film ends in .gif, .mp4 or .webm")
+    if kind == GIF and abs((played := 100 / max(2, round(100 / fps))) / fps - 1) > 0.02:
+        warnings.warn(f"a GIF lasts whole hundredths of a second a picture: {played:.3g} a second", stacklevel=3)
     pictures.field_style(name)
-    times = [time for time in run.times if start <= time <= end][::every]
+    times = [time for time in run.times if start <= time <= end][:: int(every)]
     if len(times) < 2:
         raise ConfigError(f"a film needs two snapshots or more, and there are {len(times)}; lower output_interval")
     view = pictures.extent_of(run.snapshot(times[0]), run.spacing, view)
@@ -69,9 +77,13 @@ def animate(
             yield _pixels(figure)
             progress(done, len(times))
 
+    path.parent.mkdir(exist_ok=True)
     check_target(path)
     with replacing(path) as temporary:
-        (_write_gif if path.suffix.lower() == ".gif" else _write_video)(frames(), temporary, fps, path.suffix)
+        if kind == GIF:
+            _write_gif(frames(), temporary, fps)
+        else:
+            _write_video(frames(), temporary, fps, kind)
 
 
 def _pixels(figure: Figure) -> Frame:
@@ -86,11 +98,11 @@ def _pixels(figure: Figure) -> Frame:
     return np.ascontiguousarray(pixels[:rows, :columns])
 
 
-def _write_gif(frames: Iterator[Frame], path: Path, fps: float, _: str) -> None:
+def _write_gif(frames: Iterator[Frame], path: Path, fps: float) -> None:
     from PIL import Image
 
     first, rest = Image.fromarray(next(frames)), (Image.fromarray(frame) for frame in frames)
-    first.save(path, format="GIF", save_all=True, append_images=rest, duration=round(1000 / fps), loop=0)
+    first.save(path, format="GIF", save_all=True, append_images=rest, duration=10 * max(2, round(100 / fps)), loop=0)
 
 
 def _write_video(frames: Iterator[Frame], path: Path, fps: float, suffix: str) -> None:

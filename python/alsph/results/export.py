@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-MOST_POINTS = 20_000_000
+MOST_POINTS, LARGEST = 20_000_000, 1e15
 
 
 def table(run: Record) -> pandas.DataFrame:
@@ -27,11 +27,17 @@ def table(run: Record) -> pandas.DataFrame:
     return frame.set_index("time")
 
 
-def grid(run: Record, time: float | None, spacing: float | None, box: tuple[FloatArray, FloatArray]) -> xarray.Dataset:
+def grid(
+    run: Record,
+    time: float | None,
+    spacing: float | None,
+    box: tuple[FloatArray, FloatArray],
+    domain: Mapping[str, Any],
+) -> xarray.Dataset:
     """Return the fields of a snapshot on a regular grid; see :meth:`alsph.Run.to_xarray`."""
     library = _library("xarray")
     spacing = run.spacing if spacing is None else spacing
-    if not (isinstance(spacing, int | float) and 0 < spacing < np.inf):
+    if not (isinstance(spacing, int | float) and 0 < spacing < LARGEST):
         raise ConfigError(f"spacing = {shown(spacing)}: must be a number above zero [D]")
     lower, upper = box
     cells = np.maximum(1.0, np.round((upper - lower) / spacing))
@@ -45,7 +51,7 @@ def grid(run: Record, time: float | None, spacing: float | None, box: tuple[Floa
         for name, low, high, count in zip(names, lower, upper, counts, strict=True)
     }
     points = np.stack([line.ravel() for line in np.meshgrid(*lines.values(), indexing="ij")], axis=1)
-    found = sampling.at(snapshot, points, run.spacing)
+    found = sampling.at(snapshot, points, run.spacing, domain)
 
     def field(values: FloatArray, name: str, units: str) -> tuple[Sequence[str], FloatArray, dict[str, str]]:
         return names, values.reshape(counts), {"long_name": name, "units": units}

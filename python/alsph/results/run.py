@@ -281,7 +281,7 @@ class Run:
         dict of ndarray
             ``velocity`` (m, d), ``pressure`` (m,), ``velocity_gradient`` (m, d, d), the derivative of component k
             along direction l at [:, k, l], and ``pressure_gradient`` (m, d), by quadratic moving least squares; NaN
-            where no fluid is within 1.5 Δx.
+            outside of the domain and where no fluid is within 1.5 Δx.
 
         Raises
         ------
@@ -290,8 +290,9 @@ class Run:
         RunFolderError
             If there is no snapshot.
         """
-        dimensions = self.config.case.space_dimensions
-        return sampling.at(self.snapshot(time), sampling.checked_points(points, dimensions), self.spacing)
+        case = self.config.case
+        checked = sampling.checked_points(points, case.space_dimensions)
+        return sampling.at(self.snapshot(time), checked, self.spacing, case.domain())
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the history as a table of pandas, one row a step, by time tU/D.
@@ -332,11 +333,14 @@ class Run:
         domain, dimensions = self.config.case.domain(), self.config.case.space_dimensions
         corners = domain["lower"] if lower is None else lower, domain["upper"] if upper is None else upper
         box = self._checked_box(*corners, dimensions)
-        return export.grid(self, time, spacing, box)
+        return export.grid(self, time, spacing, box, domain)
 
     @staticmethod
     def _checked_box(lower: Sequence[float], upper: Sequence[float], dimensions: int) -> tuple[FloatArray, FloatArray]:
-        box = np.array(lower, dtype=float), np.array(upper, dtype=float)
+        try:
+            box = np.array(lower, dtype=float), np.array(upper, dtype=float)
+        except (TypeError, ValueError):
+            box = np.empty(0), np.empty(0)
         if not box[0].shape == box[1].shape == (dimensions,) or not np.all(box[0] < box[1]):
             raise ConfigError(
                 f"box from {shown(lower)} to {shown(upper)}: needs corners of {dimensions} numbers, the lower one first"
@@ -509,7 +513,6 @@ class Run:
         """
         if path is None:
             check_folder(self.path / "figures")
-            (self.path / "figures").mkdir(exist_ok=True)
         target = Path(path) if path is not None else self.path / "figures" / f"{name}.gif"
         _plotting().animate(self, name, target, title=self._title, said=self._said(), **options)
         return target

@@ -56,8 +56,10 @@ def remarks(case: Case, run: Run) -> list[str]:
 
 def unlike(case: Case, run: Run) -> list[str]:
     """Say in what a run's case or geometry is not that of a case."""
-    if (was := shown_name(run.case.get("case"))) != shown_name(case.declaration()):
-        return [f"its case is {was}"]
+    was, own_case = run.case.get("case"), case.declaration()
+    if was != own_case:
+        same = shown_name(was) == shown_name(own_case)
+        return [f"its case is {shown_name(was)}" + " as another text of that file has it" * same]
     free = Case.model_fields.keys() | set(case.of_the_start)
     own = {name: value for name, value in Config(case).case_tables().items() if name not in {"case", *free}}
     return [

@@ -28,6 +28,7 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
     ConfigError
         If the particles would not fit into the memory that is free.
     """
+    config.check()
     case = config.case
     problem = case.build()
     kinds = np.bincount(problem.state["kind"], minlength=len(Kind))

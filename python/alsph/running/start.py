@@ -27,6 +27,7 @@ FIXED = ("dimensions", "particle_spacing", "smoothing_ratio", "kernel", "domain"
 def start(config: Config, path: Path, control: Control | None = None, *, force: bool = False) -> Run:
     """Run a case from its start in a new run folder: :meth:`alsph.cases.Case.run`."""
     control, folder = control or Control(), RunFolder(path)
+    config.check()
     folder.check_new(force=force, configuration=config)
     simulation = config.case.simulation(config.run.threads, config.run.initial_run)
     remarks, info = beginning.of(config)
