@@ -119,6 +119,19 @@ impl<const D: usize> Particles<D> {
         self.kind[i] == ParticleKind::Solid && !bodies[self.body[i] as usize].moves
     }
 
+    /// Take what has passed the end of its body's belt back to the beginning.
+    pub fn go_round(&mut self, bodies: &[Body]) {
+        let own = |body: &Body| body.belt.map(|belt| (belt, Vector::<D>::from_fn(|axis, _| body.velocity[axis])));
+        let belts: Vec<_> = bodies.iter().map(own).collect();
+        for i in (0..self.real).filter(|&i| self.kind[i] == ParticleKind::Solid) {
+            let Some(([from, to], velocity)) = belts[self.body[i] as usize] else { continue };
+            let along = velocity.normalize();
+            if along.dot(&self.position[i]) > to {
+                self.position[i] -= along * (to - from);
+            }
+        }
+    }
+
     /// Number of real particles of each kind: fluid, inlet, outlet, solid.
     pub fn counts(&self) -> [usize; 4] {
         let mut counts = [0; 4];

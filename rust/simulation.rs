@@ -200,6 +200,7 @@ impl<const D: usize> Simulation<D> {
     /// Boundary crossings and clock.
     fn end_step(&mut self, time_step: f64) {
         self.flow.particles.drop_images();
+        self.flow.particles.go_round(&self.settings.bodies);
         let flow = boundary::end_step(&mut self.flow.particles, &self.settings, &self.flow.frame.grid);
         self.clock.mass_in += flow.inflow;
         self.clock.mass_out += flow.outflow;
@@ -347,6 +348,14 @@ fn check_particles<const D: usize>(settings: &Settings, particles: &mut Particle
                 );
             };
             particles.velocity[i] = Vector::from_column_slice(&body.velocity);
+            let along = particles.velocity[i].try_normalize(0.0).map_or(0.0, |along| along.dot(&particles.position[i]));
+            let slack = 1e-6 * settings.particle_spacing;
+            if let Some([from, to]) = body.belt.filter(|[from, to]| !(from - slack..=to + slack).contains(&along)) {
+                return array(
+                    "position",
+                    format!("particle {i} of {} is at {along} along its belt of {from}..{to}", body.name),
+                );
+            }
         } else if let Some(axis) = (0..D).find(|&axis| is_beyond_closed_side(settings, &particles.position[i], axis)) {
             let [lower, upper] = [settings.domain.lower[axis], settings.domain.upper[axis]];
             let x = particles.position[i][axis];

@@ -413,6 +413,35 @@ fn a_moving_body_carries_its_particles_along() {
     }
 }
 
+#[test]
+fn the_particles_of_a_belt_go_round() {
+    let (mut value, particles) = channel(24, true);
+    let (first, last) = (8.0 / 24.0, 16.0 / 24.0);
+    value["bodies"][0]["velocity"] = json!([-0.5, 0.0]);
+    (value["bodies"][0]["moves"], value["bodies"][0]["belt"]) = (true.into(), json!([-last, -first]));
+    let before: Vec<_> = solids(&particles);
+    let mut simulation = Simulation::new(common::parse(&value), particles, Clock::default(), Some(2)).expect("valid");
+    simulation.advance_until(0.2, None).expect("stable");
+    let gone = 0.5 * simulation.clock().time;
+    let mut round = 0;
+    for (old, new) in before.iter().zip(solids(simulation.particles())) {
+        let passed = old.1[0] - gone < first;
+        round += usize::from(passed);
+        let expected = old.1[0] - gone + if passed { last - first } else { 0.0 };
+        assert_relative_eq!(new.1, Vector::from([expected, old.1[1]]), epsilon = 1e-12);
+    }
+    assert!(0 < round && round < before.len());
+}
+
+#[test]
+fn particles_beside_their_belt_are_refused() {
+    let (mut value, particles) = channel(24, true);
+    value["bodies"][0]["velocity"] = json!([0.5, 0.0]);
+    (value["bodies"][0]["moves"], value["bodies"][0]["belt"]) = (true.into(), json!([0.4, 0.7]));
+    let refused = Simulation::new(common::parse(&value), particles, Clock::default(), Some(1)).err().expect("refused");
+    assert!(refused.to_string().contains("of wall is at 0.35"), "{refused}");
+}
+
 fn solids(particles: &Particles<2>) -> Vec<(u64, Vector<2>)> {
     let mut solids: Vec<_> = (0..particles.real)
         .filter(|&i| particles.kind[i] == ParticleKind::Solid)

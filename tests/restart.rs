@@ -27,7 +27,7 @@ const FACTORS: [(&str, &[&str]); 18] = [
         ],
     ),
     ("third direction", &["periodic", "slip", "walls"]),
-    ("moves", &["false", "true"]),
+    ("moves", &["false", "true", "belt"]),
     ("wall_velocity", &["paper", "adami", "cubic", "morris"]),
     ("wall_pressure", &["paper", "adami", "linear"]),
     ("derivative_frame", &["midpoint", "updated", "initial", "updated, searched in every iteration"]),
@@ -135,27 +135,36 @@ fn settings<const D: usize>(configuration: &Configuration, spacing: f64) -> Valu
         })
         .to_vec()
         .into();
-    let moves = choice(configuration, "moves") == "true";
+    let moves = choice(configuration, "moves");
     let body = |name: &str, velocity: [f64; 3], moves: bool| json!({"name": name, "velocity": velocity[..D], "moves": moves, "center": vec![0.5; D]});
-    let bodies = [body("walls", [0.0; 3], false), body("lid", [0.3, 0.0, 0.0], false), body("body", [0.4, 0.0, 0.1], moves)];
+    let bodies = [
+        body("walls", [0.0; 3], false),
+        body("lid", [0.3, 0.0, 0.0], moves == "belt"),
+        body("body", [0.4, 0.0, 0.1], moves == "true"),
+    ];
     value["bodies"] = bodies.to_vec().into();
+    if moves == "belt" {
+        let outside = beyond(configuration, sides::<D>(configuration)[0]) as f64
+            * value["particle_spacing"].as_f64().expect("a number");
+        value["bodies"][1]["belt"] = json!([-outside, 1.0 + outside]);
+    }
     value
+}
+
+/// Layers of particles outside of a side: walls four deep, buffers of 6h.
+fn beyond(configuration: &Configuration, side: &str) -> i64 {
+    match (side, choice(configuration, "kernel")) {
+        ("walls", _) => 4,
+        ("open", "quintic_spline") => 8,
+        ("open", _) => 10,
+        _ => 0,
+    }
 }
 
 /// A disordered box of fluid with the walls, buffers and the body of the layout.
 fn particles<const D: usize>(configuration: &Configuration, side: i64, spacing: f64, random: &mut Random) -> Particles<D> {
     let sides = sides::<D>(configuration);
-    // Walls four layers deep, buffers of 6h.
-    let buffer = if choice(configuration, "kernel") == "quintic_spline" { 8 } else { 10 };
-    let beyond = sides.map(|side| {
-        if side == "walls" {
-            4
-        } else if side == "open" {
-            buffer
-        } else {
-            0
-        }
-    });
+    let beyond = sides.map(|side| beyond(configuration, side));
     let widths = beyond.map(|beyond| side + 2 * beyond);
     let mut particles = common::particles(Vec::new());
     for k in 0..widths.iter().product() {

@@ -266,3 +266,19 @@ def test_a_case_that_cannot_be_used_is_told_and_left_out(command, entry, told):
     done = command("cases", cases=(entry,))
     assert done.returncode == 0 and "cylinder" in done.stdout and "another package" not in done.stdout
     assert "is left out" in done.stderr and told in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("measures", "told"),
+    [
+        ("[Measure('peak', run.history['u_max'][-1])]", "KeyError: 'u_max'; correct the file that defines it"),
+        ("[('peak', 1.0)]", "TypeError: ('peak', 1.0) is no Measure"),
+    ],
+)
+def test_measures_that_fail_leave_the_rest_of_the_results(command, tmp_path, measures, told):
+    text = HEATED.replace(FIELD, FIELD + f"\n    def measures(self, run):\n        return {measures}\n")
+    (tmp_path / "my_cases.py").write_text("from alsph.analysis.measures import Measure\n" + text)
+    done = command("run", "my_cases.py", "--resolution", 8, "--until", 0.05, "-o", "run", cases=())
+    assert done.returncode == 0 and "mean velocity divergence" in done.stdout, done.stderr
+    assert "no measures: those of Heated fail, " in done.stdout and told in done.stdout
+    assert command("resume", "run", "--until", 0.1, cases=()).returncode == 0

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 import shapely
 from alsph import Run
-from alsph.cases import CASES, BackwardFacingStep, Body, Cavity, Cylinder, Poiseuille, TaylorGreen, remarks
+from alsph.cases import CASES, BackwardFacingStep, Bodies, Body, Cavity, Cylinder, Poiseuille, TaylorGreen, remarks
 from alsph.geometry.thin import carried
 from alsph.results.outcome import outcome
-from shapely import affinity
+from shapely import Point, affinity
 from synthetic import write_run
 
 
@@ -191,3 +191,34 @@ def test_a_study_says_before_it_runs_what_its_cases_cannot_carry(tmp_path, alsph
     assert remarks.tally(["coarse, kernel", "", "coarse"]) == "coarse: 2 of 3 runs, kernel: 1 of 3 runs"
     stdout = alsph("study", "run", "time-step", "--preset", "quick", "--dry-run", "-o", tmp_path)[1]
     assert "remarks: coarse: 20 of 20 runs" in stdout
+
+
+def test_gaps_that_are_not_resolved():
+    class Two(Bodies):
+        """Two cylinders side by side.
+
+        Apart.
+        """
+
+        gap: float = 1.0
+
+        def shapes(self):
+            return [Point(0, side * (0.5 + self.gap / 2)).buffer(0.5) for side in (-1, 1)]
+
+    def said(gap):
+        return [remark for remark in Two(gap=gap, resolution=10).remarks() if remark.startswith("narrow gap")]
+
+    assert said(0.5) == []
+    assert said(0.3) == [
+        "narrow gap: 3 Δx between body_1 and body_2; the flow there is not resolved, use a finer resolution"
+    ]
+    assert said(0.05) == ["narrow gap: 0.5 Δx between body_1 and body_2; nothing flows there, use a finer resolution"]
+    assert (Two.name, Two.title) == ("two", "two cylinders side by side")
+
+
+def test_a_class_of_the_users_says_what_it_inherits():
+    class Slow(Cavity):
+        """A slow lid."""
+
+    assert Slow().remarks()[-1].startswith("not validated: Slow has what it does not say itself from Cavity")
+    assert not any("does not say itself" in remark for remark in Cavity().remarks())

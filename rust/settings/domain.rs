@@ -30,8 +30,12 @@ pub struct Body {
     pub name: String,
     /// Prescribed velocity.
     pub velocity: Vec<f64>,
-    /// Whether the particles move with that velocity (a cavity's lid slides in place: false).
+    /// Whether the particles move with that velocity.
     pub moves: bool,
+    /// Where the particles of a body that moves go round, from and to, coordinates along its velocity: those that pass the end come back at
+    /// the beginning, as on a belt.
+    #[serde(default)]
+    pub belt: Option<[f64; 2]>,
     /// Point that the torque is taken about. It stays where it is when the body moves.
     pub center: Vec<f64>,
 }
@@ -66,6 +70,12 @@ pub(super) fn validate_bodies(bodies: &[Body], dimensions: usize) -> Result<()> 
         }
         validate_vector(&format!("bodies.{}.velocity", body.name), &body.velocity, dimensions)?;
         validate_vector(&format!("bodies.{}.center", body.name), &body.center, dimensions)?;
+        if body.belt.is_some_and(|[from, to]| !(body.moves && from.is_finite() && to.is_finite() && from < to)) {
+            return Err(setting(
+                format!("bodies.{}.belt", body.name),
+                "must be two numbers, the lower one first, of a body that moves",
+            ));
+        }
     }
     Ok(())
 }

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+import re
 import warnings
 from abc import abstractmethod
 from pathlib import Path
@@ -24,13 +26,27 @@ from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
 from alsph.memory import check
-from alsph.parameters import Parameters
 
 if TYPE_CHECKING:
     from alsph.results.run import Run
 
 VELOCITY_LIMIT = 50.0
 """Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
+
+
+WORD = re.compile(r"(?<=[a-z0-9])(?=[A-Z][a-z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[a-z])(?=[A-Z])")
+"""Where a new word begins in the name of a class."""
+
+
+def name_of(model: type) -> str:
+    """Return the name of a case that has none: its class's, in small letters."""
+    return WORD.sub("_", model.__name__).lower()
+
+
+def title_of(model: type) -> str:
+    """Return the title of a case that has none: the first line of its docstring."""
+    first = re.split(r"\n|Parameters\n---", (model.__doc__ or "").strip())[0].rstrip(".")
+    return first[:1].lower() + first[1:] or name_of(model)
 
 
 class Case(Method):
@@ -50,7 +66,7 @@ class Case(Method):
     """Parameters of the case that nothing but its own start depends on."""
     later_names: ClassVar[tuple[str, ...]] = ()
     """Measures and profiles, or beginnings of their names, that only a run with some results has."""
-    code: ClassVar[Parameters | None] = None
+    code: ClassVar[Any] = None
     """The Python file of the user's that it stands in, a :class:`alsph.cases.source.Source`."""
 
     reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
@@ -60,6 +76,15 @@ class Case(Method):
     def parameter_names(cls) -> list[str]:
         """Return the names of the parameters, those of the problem before those of the numerical method."""
         return sorted(cls.model_fields, key=lambda name: name in Method.model_fields)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **options: Any) -> None:
+        """Name a class that has no name of its own or its bases'."""
+        super().__pydantic_init_subclass__(**options)
+        if not inspect.isabstract(cls):
+            for name, of in (("name", name_of), ("title", title_of)):
+                if not hasattr(cls, name):
+                    setattr(cls, name, of(cls))
 
     @classmethod
     def declaration(cls) -> str | dict[str, Any]:
@@ -201,6 +226,7 @@ class Case(Method):
             *(remarks.validated(self.reynolds, self.resolution, self.cell_reynolds, known) if known else []),
             *remarks.kernel(self.kernel, self.smoothing_ratio),
             *remarks.scheme(self.scheme, self.wall_pressure),
+            *remarks.derived(type(self)),
             *remarks.penalty(self.expected_penalty_constant()),
         ]
 

@@ -131,7 +131,8 @@ class Bodies(Channel):
             for name, outline, left in zip(self.coefficient_bodies, self.outlines, self.carried, strict=True)
             for remark in remarks.thin(name, outline, left, self.particle_spacing)
         ]
-        return [*super().remarks(), *thin, unknown]
+        near = remarks.gaps(self.coefficient_bodies, self.carried, self.particle_spacing)
+        return [*super().remarks(), *thin, *near, unknown]
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces on all bodies together, the Strouhal number, and the mean forces on each of several."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import shapely
@@ -17,9 +17,9 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.base import Case
-from alsph.geometry.lattice import cells
+from alsph.geometry.lattice import cell_centres, cells, lattice
 from alsph.geometry.particles import Kind, join, particles
-from alsph.geometry.solids import walls
+from alsph.geometry.solids import Solid, walls
 
 BOX = shapely.box(0, 0, 1, 1)
 LINE = np.linspace(0, 1, 401)[1:-1]
@@ -50,6 +50,9 @@ class Cavity(Case):
     title: ClassVar[str] = "lid-driven cavity"
 
     resolution: int = Field(default=50, ge=8, description="particles per side of the cavity, D/Δx [-]")
+    lid: Literal["slides", "in_place"] = Field(
+        default="slides", description="whether the particles of the lid go along with it, or stay, as they once did"
+    )
 
     @property
     def default_until(self) -> float:
@@ -71,13 +74,21 @@ class Cavity(Case):
         return {"lower": [0.0, 0.0], "upper": [1.0, 1.0], "boundaries": [["none", "none"]] * 2}
 
     def bodies(self) -> list[dict[str, Any]]:
-        """Return the walls at rest, and the lid, which slides in place.
+        """Return the walls at rest, and the lid.
 
         The lid reaches over both corners. A lid between resting corners tears away from one of them, which sucks fluid
         into the wall.
         """
-        centre = {"moves": False, "center": [0.5, 0.5]}
-        return [{"name": "walls", "velocity": [0.0, 0.0]} | centre, {"name": "lid", "velocity": [1.0, 0.0]} | centre]
+        about = {"center": [0.5, 0.5]}
+        lid = {"name": "lid", "velocity": [1.0, 0.0]} | about
+        slides = {"moves": True, "belt": self._belt} if self.lid == "slides" else {"moves": False}
+        return [{"name": "walls", "velocity": [0.0, 0.0], "moves": False} | about, lid | slides]
+
+    @property
+    def _belt(self) -> list[float]:
+        """Where the lid begins and ends, a layer farther than the fluid sees [D]."""
+        beyond = (self.support_layers + 1) * self.particle_spacing
+        return [-beyond, 1 + beyond]
 
     def particle_estimate(self) -> int:
         """Return about how many particles there are, without the walls' outer corners."""
@@ -86,12 +97,20 @@ class Cavity(Case):
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a lattice of fluid at rest and the solid particles around it."""
         solid = walls(BOX, self.particle_spacing, self.support_layers)
-        lid = solid.position[:, 1] > 1
+        below = solid.position[:, 1] < 1
+        lid = self._plate() if self.lid == "slides" else solid.where(~below)
         return join(
             particles(Kind.FLUID, cells(BOX, self.particle_spacing), 0.0),
-            solid.where(~lid).particles(),
-            solid.where(lid).particles([1.0, 0.0], body=1),
+            solid.where(below).particles(),
+            lid.particles([1.0, 0.0], body=1),
         )
+
+    def _plate(self) -> Solid:
+        """Return a lid that is the same all along, so that it may slide."""
+        spacing, layers = self.particle_spacing, self.support_layers
+        x = self._belt[0] + cell_centres(self.resolution + 2 * (layers + 1), spacing)
+        position = lattice(x, 1 + cell_centres(layers, spacing))
+        return Solid(position, np.broadcast_to([0.0, -1.0], position.shape).copy(), position[:, 1] - 1)
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the extrema of the velocities on the centre lines, averaged over the last quarter of the run."""

@@ -5,6 +5,7 @@ A remark is a text ``keyword: what it is; what to do about it``. Each limit says
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -38,6 +39,9 @@ COMPRESSIBLE = 0.46
 """Largest artificial Mach number of the penalty with which results have been compared (docs/performance.md, Cost and
 error)."""
 
+
+CLOSEST = 4.0
+"""Width of a gap between bodies [Δx] below which it is remarked on."""
 
 TOO_THIN = "too thin"
 """What is remarked on a body that the resolution does not carry, and refused."""
@@ -222,4 +226,27 @@ def thin(name: str, shape: Polygon, carried: Polygon | MultiPolygon, spacing: fl
     if thick < 0.99 * THICK * spacing:
         known = "lift and drag were found off by 20 to 30 % below 3 Δx, by 4 % at 5 Δx"
         found.append(f"thin body: {thick / spacing:.2g} Δx at its thickest; {known}; use a finer resolution")
+    return found
+
+
+def derived(model: type) -> list[str]:
+    """Remark on a class of the user's that derives from a shipped case, with whose reference it may be compared."""
+    shipped = [base for base in model.__mro__ if base.__module__.startswith("alsph.cases.") and "title" in vars(base)]
+    if model.__module__.startswith("alsph.") or not shipped:
+        return []
+    text = (
+        f"{model.__name__} has what it does not say itself from {shipped[0].__name__}: references and tolerances, too"
+    )
+    return [f"not validated: {text}; if its flow is another one it needs its own measures, profiles and validated"]
+
+
+def gaps(names: list[str], bodies: list[Polygon | MultiPolygon], spacing: float) -> list[str]:
+    """Remark on bodies so near each other that the flow between them is not resolved (lengths in D)."""
+    found = []
+    for first, second in itertools.combinations(range(len(bodies)), 2):
+        gap = shapely.distance(bodies[first], bodies[second]) / spacing
+        if gap < CLOSEST:
+            through = "nothing flows there" if gap < 1 else "the flow there is not resolved"
+            pair = f"{gap:.2g} Δx between {names[first]} and {names[second]}"
+            found.append(f"narrow gap: {pair}; {through}, use a finer resolution")
     return found

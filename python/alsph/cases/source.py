@@ -15,7 +15,7 @@ from typing import Any, Self
 
 from pydantic import Field, model_validator
 
-from alsph.cases.base import Case
+from alsph.cases.base import Case, name_of, title_of
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters, suggest
 from alsph.text import contents, shown
@@ -29,9 +29,6 @@ REFERENCE = re.compile(r"(?P<path>.+\.py)(:(?P<name>[^\W\d]\w*))?")
 
 NEWLINE = re.compile("\r+\n?")
 """Ends of lines of other systems, which a case.toml does not keep."""
-
-WORD = re.compile(r"(?<=[a-z0-9])(?=[A-Z][a-z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[a-z])(?=[A-Z])")
-"""Where a new word begins in the name of a class."""
 
 
 class Source(Parameters):
@@ -161,10 +158,9 @@ def _complete(model: type[Case], source: Source) -> None:
     """Give a class its source and, where it has none of its own, a name and a title."""
     own = vars(model)
     if "name" not in own:
-        model.name = WORD.sub("_", model.__name__).lower()
+        model.name = name_of(model)
     if "title" not in own:
-        first = re.split(r"\n|Parameters\n---", (model.__doc__ or "").strip())[0].rstrip(".")
-        model.title = first[:1].lower() + first[1:] or model.name
+        model.title = title_of(model)
     if not (isinstance(model.name, str) and re.fullmatch(r"[\w-]+", model.name)):
         raise ValueError(f"name = {model.name!r} of {model.__name__}: may hold letters, digits, _ and - only")
     if not isinstance(model.title, str):

@@ -2,6 +2,7 @@
 
 import functools
 import inspect
+import re
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -103,7 +104,7 @@ class CaseGroup(TyperGroup):
                 ctx.obj = config.load(cmd_name)
             model = type(ctx.obj.case) if ctx.obj else cases.find(cmd_name)
             app = typer.Typer(add_completion=False, rich_markup_mode=None)
-            text = (model.__doc__ or "").split("Parameters\n---")[0].strip()
+            text = re.sub(r":\w+:`([^`]*)`", r"\1", (model.__doc__ or "").split("Parameters\n---")[0].strip())
             app.command(model.name, help=text, short_help=model.title)(_case_command(model, self.action))
             return get_command(app)
         raise AssertionError("the block ends in one way or the other")

@@ -153,7 +153,8 @@ def _animate(
     """
     run = Run(path)
     times = {name: value for name, value in (("start", start), ("end", end)) if value is not None}
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("pictures", total=None)
 
         def progress(done: int, count: int) -> None:

@@ -20,7 +20,7 @@ from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.probes import Probes
 from alsph.arrays import AXES, FloatArray
 from alsph.cases import remarks
-from alsph.cases.source import shown_name
+from alsph.cases.source import reason, shown_name
 from alsph.config import Config, of_run
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
@@ -98,8 +98,23 @@ class Run:
 
     @cached_property
     def measures(self) -> list[Measure]:
-        """What the run is judged by: numbers beside their reference values."""
-        return self.config.case.measures(self)
+        """What the run is judged by: numbers beside their reference values; none if the case's own code fails."""
+        return self._judged[0]
+
+    @cached_property
+    def _judged(self) -> tuple[list[Measure], list[str]]:
+        """The measures, and what went wrong with them in code of the user's."""
+        case = self.config.case
+        try:
+            found = case.measures(self)
+            if odd := [measure for measure in found if not isinstance(measure, Measure)]:
+                raise TypeError(f"{shown(odd[0])} is no Measure")
+        except Exception as error:
+            if type(case).__module__.startswith("alsph."):
+                raise
+            what = reason(error, case.code.file if case.code else "<cell>")
+            return [], [f"no measures: those of {type(case).__name__} fail, {what}; correct the file that defines it"]
+        return found, []
 
     @cached_property
     def profiles(self) -> list[Profile]:
@@ -408,7 +423,7 @@ class Run:
 
         What resolution, method and domain cannot carry (:meth:`alsph.cases.Case.remarks`), and what came of the run.
         """
-        return [*outcome(self, self.config.until), *self.config.case.remarks()]
+        return [*outcome(self, self.config.until), *self._judged[1], *self.config.case.remarks()]
 
     def summary(self) -> dict[str, Any]:
         """Return the run's main results by name, its measures each followed by the reference value where there is one.

@@ -7,6 +7,7 @@ import numpy as np
 from alsph.cases import Body
 from alsph.config import Config
 from alsph.engine.simulation import Simulation
+from alsph.errors import SolverError
 from alsph.geometry.particles import Kind
 from alsph.text import duration
 
@@ -57,8 +58,11 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
             lines.append((f"{name.replace('_', ' ')} limit", text))
     lines.append(("steps", f"about {steps:,.0f} to t* = {config.until:g}"))
     if probe:
-        seconds = _seconds_per_step(case.restored(problem.state, config.run.threads))
-        lines.append(("estimated time", f"{duration(seconds * steps)} at {seconds:.3g} s a step"))
+        try:
+            seconds = _seconds_per_step(case.restored(problem.state, config.run.threads))
+            lines.append(("estimated time", f"{duration(seconds * steps)} at {seconds:.3g} s a step"))
+        except SolverError as error:
+            lines.append(("warning", f"breaks down in the first steps: {error}"))
     if warning := case.time_step_warning():
         lines.append(("warning", warning))
     return lines + [("remark", remark) for remark in case.remarks()]

@@ -167,6 +167,7 @@ class Driver:
 
     def _rescue(self, message: str) -> str:
         """Keep what can be had of a run that broke down; the last checkpoint stays as it is."""
+        message += "; --retry 3 goes back and on with half the step, again and again"
         message += f"; the last good state, t* = {self.saved['time']:.4g}, is in {self.folder.path / 'checkpoint.h5'}"
         with contextlib.suppress(AlsphError):
             self.unwritten.append(self.simulation.new_history(keep=False))
