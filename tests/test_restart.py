@@ -217,7 +217,7 @@ def test_a_class_that_is_not_known_by_its_name_is_told_and_not_resumed(tmp_path)
 def test_a_case_that_is_not_known_is_told_how_to_make_known(tmp_path):
     with pytest.warns(RuntimeWarning, match="does not know it"):
         path = Pulsing(**SMALL).run(tmp_path / "run", until=0.02, progress=False).path
-    with pytest.raises(RunFolderError, match="a case of your own must be put into alsph.cases.CASES"):
+    with pytest.raises(RunFolderError, match="an entry point of its package, or put into alsph.cases.CASES before"):
         resume(path, progress=False)
 
 

@@ -256,6 +256,8 @@ def of_run(folder: Path) -> Config:
     try:
         return load(folder / "case.toml", folder, Path())
     except ConfigError as error:
+        if "unknown case" in str(error):
+            raise RunFolderError(str(error)) from None
         remedy = (
             "it is of an older alsph and does not hold the outline: put the file into it, or go to where it was run"
             if "shape = '" in str(error)
