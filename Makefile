@@ -68,7 +68,7 @@ $(ENVIRONMENT): pyproject.toml
 	touch $@
 
 $(TOOLS): $(ENVIRONMENT)
-	$(BIN)/python -m pip install --quiet --group dev
+	$(BIN)/python -m pip install --quiet --group test
 	touch $@
 
 $(EXTENSION): $(ENVIRONMENT) $(SOURCES)
