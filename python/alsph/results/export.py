@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alsph.analysis import sampling
-from alsph.analysis.record import Record
 from alsph.arrays import AXES, FloatArray
 from alsph.errors import ConfigError
+from alsph.geometry.particles import Snapshot
 from alsph.text import shown
 
 if TYPE_CHECKING:
@@ -21,22 +21,22 @@ if TYPE_CHECKING:
 MOST_POINTS, LARGEST = 20_000_000, 1e15
 
 
-def table(run: Record) -> pandas.DataFrame:
+def table(history: dict[str, FloatArray]) -> pandas.DataFrame:
     """Return the history of a run, one row a step; see :meth:`alsph.Run.to_pandas`."""
-    frame: pandas.DataFrame = _library("pandas").DataFrame(run.history)
+    frame: pandas.DataFrame = _library("pandas").DataFrame(history)
     return frame.set_index("time")
 
 
 def grid(
-    run: Record,
-    time: float | None,
+    snapshot: Snapshot,
+    own_spacing: float,
     spacing: float | None,
     box: tuple[FloatArray, FloatArray],
     domain: Mapping[str, Any],
 ) -> xarray.Dataset:
     """Return the fields of a snapshot on a regular grid; see :meth:`alsph.Run.to_xarray`."""
     library = _library("xarray")
-    spacing = run.spacing if spacing is None else spacing
+    spacing = own_spacing if spacing is None else spacing
     if not (isinstance(spacing, int | float) and 0 < spacing < LARGEST):
         raise ConfigError(f"spacing = {shown(spacing)}: must be a number above zero [D]")
     lower, upper = box
@@ -44,14 +44,13 @@ def grid(
     if cells.prod() > MOST_POINTS:
         raise ConfigError(f"spacing = {spacing:g}: more than {MOST_POINTS:,} points; use a larger one or a smaller box")
     counts = cells.astype(int)
-    snapshot = run.snapshot(time)
     names = AXES[: len(counts)]
     lines = {
         name: low + (np.arange(count) + 0.5) * (high - low) / count
         for name, low, high, count in zip(names, lower, upper, counts, strict=True)
     }
     points = np.stack([line.ravel() for line in np.meshgrid(*lines.values(), indexing="ij")], axis=1)
-    found = sampling.at(snapshot, points, run.spacing, domain)
+    found = sampling.at(snapshot, points, own_spacing, domain)
 
     def field(values: FloatArray, name: str, units: str) -> tuple[Sequence[str], FloatArray, dict[str, str]]:
         return names, values.reshape(counts), {"long_name": name, "units": units}

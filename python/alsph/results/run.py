@@ -11,35 +11,29 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from alsph.analysis import averages, sampling
+from alsph.analysis import averages
 from alsph.analysis.averages import Estimate, Window
 from alsph.analysis.loads import Divergence, Load, PressureCoefficient
 from alsph.analysis.measures import Measure, Profile
-from alsph.analysis.probes import Probes
 from alsph.arrays import AXES, FloatArray
 from alsph.cases import remarks
 from alsph.cases.source import reason, shown_name
-from alsph.config import Config, of_run
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
 from alsph.folder.durable import check_folder
 from alsph.folder.run_folder import RunFolder
-from alsph.geometry.particles import Snapshot
 from alsph.parameters import checked_point, choose
-from alsph.results import export
+from alsph.results.fields import Fields
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.outcome import outcome
 from alsph.text import duration, in_figure, printable, shown
 
 if TYPE_CHECKING:
-    import pandas
-    import xarray
     from matplotlib.figure import Figure
 
 
-class Run:
+class Run(Fields):
     """The results in a run folder, finished or not, read when they are first asked for.
 
     Lengths are in D, velocities in U and times in D/U. A run that is still going on is seen as it was when each part
@@ -86,16 +80,6 @@ class Run:
         """
         return str(self.info.get("status", "unknown"))
 
-    @property
-    def spacing(self) -> float:
-        """Particle spacing Δx [D]."""
-        return 1.0 / float(self.case["resolution"])
-
-    @cached_property
-    def config(self) -> Config:
-        """The case and the settings of the run, as the objects that :attr:`case` was written from."""
-        return of_run(self.path)
-
     @cached_property
     def measures(self) -> list[Measure]:
         """What the run is judged by: numbers beside their reference values; none if the case's own code fails."""
@@ -125,11 +109,6 @@ class Run:
     def ledger(self) -> Ledger:
         """How incompressible the flow stayed, and where its kinetic energy went."""
         return Ledger.of(self, self.config.case)
-
-    @cached_property
-    def history(self) -> dict[str, FloatArray]:
-        """Columns of ``history.csv``, one entry a step; only an empty ``time`` before the first step."""
-        return reading.history(self.path / "history.csv")
 
     @property
     def bodies(self) -> list[str]:
@@ -276,146 +255,10 @@ class Run:
             surface = case if case and np.array_equal(case.angle, angle) else None
         return PressureCoefficient(angle, mean, deviation, int(inside), self.window.developing, surface)
 
-    @cached_property
-    def probes(self) -> Probes:
-        """Velocity and pressure at the probes over time; empty without any."""
-        return reading.probes(self.path / "probes.h5", self.config.case.space_dimensions)
-
-    def sample(self, points: ArrayLike, time: float | None = None) -> dict[str, FloatArray]:
-        """Velocity, pressure and their gradients at any points of a snapshot.
-
-        Parameters
-        ----------
-        points : array_like, shape (m, d)
-            The points [D].
-        time : float, optional
-            The snapshot nearest to it is taken [D/U]; the last one if None.
-
-        Returns
-        -------
-        dict of ndarray
-            ``velocity`` (m, d), ``pressure`` (m,), ``velocity_gradient`` (m, d, d), the derivative of component k
-            along direction l at [:, k, l], and ``pressure_gradient`` (m, d), by quadratic moving least squares; NaN
-            outside of the domain and where no fluid is within 1.5 Δx.
-
-        Raises
-        ------
-        ConfigError
-            If `points` are none, or `time` is no number.
-        RunFolderError
-            If there is no snapshot.
-        """
-        case = self.config.case
-        checked = sampling.checked_points(points, case.space_dimensions)
-        return sampling.at(self.snapshot(time), checked, self.spacing, case.domain())
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return the history as a table of pandas, one row a step, by time tU/D.
-
-        Raises
-        ------
-        ConfigError
-            If pandas is not installed.
-        """
-        return export.table(self)
-
-    def to_xarray(
-        self,
-        time: float | None = None,
-        spacing: float | None = None,
-        lower: Sequence[float] | None = None,
-        upper: Sequence[float] | None = None,
-    ) -> xarray.Dataset:
-        """Return velocity, pressure and, in 2-D, vorticity of a snapshot on a regular grid, by :meth:`sample`.
-
-        ``run.to_xarray().to_netcdf("flow.nc")`` makes a file for other programs.
-
-        Parameters
-        ----------
-        time : float, optional
-            The snapshot nearest to it is taken [D/U]; the last one if None.
-        spacing : float, optional
-            Of the grid [D]; that of the particles if None.
-        lower, upper : sequence of float, optional
-            Corners of the box that is covered with cells, whose middles the values are of [D]; those of the domain if
-            None.
-
-        Raises
-        ------
-        ConfigError
-            If xarray is not installed, or there is no such grid.
-        """
-        domain, dimensions = self.config.case.domain(), self.config.case.space_dimensions
-        corners = domain["lower"] if lower is None else lower, domain["upper"] if upper is None else upper
-        box = self._checked_box(*corners, dimensions)
-        return export.grid(self, time, spacing, box, domain)
-
-    @staticmethod
-    def _checked_box(lower: Sequence[float], upper: Sequence[float], dimensions: int) -> tuple[FloatArray, FloatArray]:
-        try:
-            box = np.array(lower, dtype=float), np.array(upper, dtype=float)
-        except (TypeError, ValueError):
-            box = np.empty(0), np.empty(0)
-        if not box[0].shape == box[1].shape == (dimensions,) or not np.all(box[0] < box[1]):
-            raise ConfigError(
-                f"box from {shown(lower)} to {shown(upper)}: needs corners of {dimensions} numbers, the lower one first"
-            )
-        return box
-
     def _measure(self, measure: Callable[[FloatArray, FloatArray, Window], Estimate], values: FloatArray) -> Estimate:
         if np.isnan(values).all():
             return Estimate(np.nan, note="no steps recorded yet" if len(values) == 0 else "no body to measure")
         return measure(self.history["time"], values, self.window)
-
-    @cached_property
-    def times(self) -> FloatArray:
-        """Times tU/D of the snapshots, shape (k,)."""
-        return reading.snapshot_times(self.path / "particles.vtkhdf")
-
-    def snapshot(self, time: float | None = None) -> Snapshot:
-        """Particles of the snapshot nearest to a time tU/D, the last one if None.
-
-        Raises
-        ------
-        ConfigError
-            If the time is no finite number.
-        RunFolderError
-            If there is no complete snapshot.
-        """
-        if time is not None and not (isinstance(time, int | float | np.number) and np.isfinite(time)):
-            raise ConfigError(f"time = {shown(time)}: must be a finite number")
-        if len(self.times) == 0:
-            raise RunFolderError(f"{self.path}: no snapshot yet; wait for the first one or lower output_interval")
-        index = len(self.times) - 1 if time is None else int(np.abs(self.times - time).argmin())
-        return reading.snapshot(self.path / "particles.vtkhdf", index)
-
-    def momentum_balance(self, lower: tuple[float, ...], upper: tuple[float, ...]) -> FloatArray:
-        """Mean force coefficients from the momentum balance of a box around the body: a check of the recorded loads.
-
-        Parameters
-        ----------
-        lower, upper : tuple of float
-            Corners of the box [D]; its faces must lie in the fluid.
-
-        Returns
-        -------
-        ndarray, shape (d,)
-            Averaged over the snapshots in the averaging window; NaN if there are fewer than two.
-        """
-        times = self.times[(self.times >= self.window.start) & (self.times <= self.window.end)]
-        box = self._checked_box(lower, upper, self.config.case.space_dimensions)
-        if len(times) < 2:
-            return np.full(len(lower), np.nan)
-        balances = [self._box_balance(self.snapshot(time), box) for time in times]
-        surface, momentum = (np.array(values) for values in zip(*balances, strict=True))
-        mean = averages.batch_means(times, surface, times[[0, -1]])[0]
-        return np.asarray(2.0 * (mean - (momentum[-1] - momentum[0]) / (times[-1] - times[0])))
-
-    def _box_balance(self, snapshot: Snapshot, box: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
-        fluid = snapshot.fluid
-        viscosity = self.config.case.kinematic_viscosity
-        fields = snapshot.position[fluid], snapshot.velocity[fluid], snapshot.pressure[fluid]
-        return sampling.control_volume(*fields, box, self.spacing, 1.0, viscosity)
 
     @cached_property
     def remarks(self) -> list[str]:

@@ -1,0 +1,197 @@
+"""What a run folder holds: history, snapshots and probes, and the fields at points and on grids that come of them."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from alsph.analysis import averages, sampling
+from alsph.analysis.averages import Window
+from alsph.analysis.probes import Probes
+from alsph.arrays import FloatArray
+from alsph.config import Config, of_run
+from alsph.errors import ConfigError, RunFolderError
+from alsph.folder import reading
+from alsph.geometry.particles import Snapshot
+from alsph.results import export
+from alsph.text import shown
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+
+class Fields:
+    """The part of :class:`alsph.Run` that reads history, particles and probes."""
+
+    path: Path
+    case: dict[str, Any]
+
+    @property
+    @abstractmethod
+    def window(self) -> Window:
+        """Averaging window."""
+
+    @property
+    def spacing(self) -> float:
+        """Particle spacing Δx [D]."""
+        return 1.0 / float(self.case["resolution"])
+
+    @cached_property
+    def config(self) -> Config:
+        """The case and the settings of the run, as the objects that :attr:`case` was written from."""
+        return of_run(self.path)
+
+    @cached_property
+    def times(self) -> FloatArray:
+        """Times tU/D of the snapshots, shape (k,)."""
+        return reading.snapshot_times(self.path / "particles.vtkhdf")
+
+    def snapshot(self, time: float | None = None) -> Snapshot:
+        """Particles of the snapshot nearest to a time tU/D, the last one if None.
+
+        Raises
+        ------
+        ConfigError
+            If the time is no finite number.
+        RunFolderError
+            If there is no complete snapshot.
+        """
+        if time is not None and not (isinstance(time, int | float | np.number) and np.isfinite(time)):
+            raise ConfigError(f"time = {shown(time)}: must be a finite number")
+        if len(self.times) == 0:
+            raise RunFolderError(f"{self.path}: no snapshot yet; wait for the first one or lower output_interval")
+        index = len(self.times) - 1 if time is None else int(np.abs(self.times - time).argmin())
+        return reading.snapshot(self.path / "particles.vtkhdf", index)
+
+    @cached_property
+    def probes(self) -> Probes:
+        """Velocity and pressure at the probes over time; empty without any."""
+        return reading.probes(self.path / "probes.h5", self.config.case.space_dimensions)
+
+    def sample(self, points: ArrayLike, time: float | None = None) -> dict[str, FloatArray]:
+        """Velocity, pressure and their gradients at any points of a snapshot.
+
+        Parameters
+        ----------
+        points : array_like, shape (m, d)
+            The points [D].
+        time : float, optional
+            The snapshot nearest to it is taken [D/U]; the last one if None.
+
+        Returns
+        -------
+        dict of ndarray
+            ``velocity`` (m, d), ``pressure`` (m,), ``velocity_gradient`` (m, d, d), the derivative of component k
+            along direction l at [:, k, l], and ``pressure_gradient`` (m, d), by quadratic moving least squares; NaN
+            outside of the domain and where no fluid is within 1.5 Δx.
+
+        Raises
+        ------
+        ConfigError
+            If `points` are none, or `time` is no number.
+        RunFolderError
+            If there is no snapshot.
+        """
+        case = self.config.case
+        checked = sampling.checked_points(points, case.space_dimensions)
+        return sampling.at(self.snapshot(time), checked, self.spacing, case.domain())
+
+    @cached_property
+    def history(self) -> dict[str, FloatArray]:
+        """Columns of ``history.csv``, one entry a step; only an empty ``time`` before the first step."""
+        return reading.history(self.path / "history.csv")
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the history as a table of pandas, one row a step, by time tU/D.
+
+        Raises
+        ------
+        ConfigError
+            If pandas is not installed.
+        """
+        return export.table(self.history)
+
+    def to_xarray(
+        self,
+        time: float | None = None,
+        spacing: float | None = None,
+        lower: Sequence[float] | None = None,
+        upper: Sequence[float] | None = None,
+    ) -> xarray.Dataset:
+        """Return velocity, pressure and, in 2-D, vorticity of a snapshot on a regular grid, by :meth:`sample`.
+
+        ``run.to_xarray().to_netcdf("flow.nc")`` makes a file for other programs.
+
+        Parameters
+        ----------
+        time : float, optional
+            The snapshot nearest to it is taken [D/U]; the last one if None.
+        spacing : float, optional
+            Of the grid [D]; that of the particles if None.
+        lower, upper : sequence of float, optional
+            Corners of the box that is covered with cells, whose middles the values are of [D]; those of the domain if
+            None.
+
+        Raises
+        ------
+        ConfigError
+            If xarray is not installed, or there is no such grid.
+        """
+        domain, dimensions = self.config.case.domain(), self.config.case.space_dimensions
+        corners = domain["lower"] if lower is None else lower, domain["upper"] if upper is None else upper
+        box = checked_box(*corners, dimensions)
+        return export.grid(self.snapshot(time), self.spacing, spacing, box, domain)
+
+    def momentum_balance(self, lower: tuple[float, ...], upper: tuple[float, ...]) -> FloatArray:
+        """Mean force coefficients from the momentum balance of a box around the body: a check of the recorded loads.
+
+        Parameters
+        ----------
+        lower, upper : tuple of float
+            Corners of the box [D]; its faces must lie in the fluid.
+
+        Returns
+        -------
+        ndarray, shape (d,)
+            Averaged over the snapshots in the averaging window; NaN if there are fewer than two.
+        """
+        times = self.times[(self.times >= self.window.start) & (self.times <= self.window.end)]
+        box = checked_box(lower, upper, self.config.case.space_dimensions)
+        if len(times) < 2:
+            return np.full(len(lower), np.nan)
+        balances = [self._box_balance(self.snapshot(time), box) for time in times]
+        surface, momentum = (np.array(values) for values in zip(*balances, strict=True))
+        mean = averages.batch_means(times, surface, times[[0, -1]])[0]
+        return np.asarray(2.0 * (mean - (momentum[-1] - momentum[0]) / (times[-1] - times[0])))
+
+    def _box_balance(self, snapshot: Snapshot, box: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
+        fluid = snapshot.fluid
+        viscosity = self.config.case.kinematic_viscosity
+        fields = snapshot.position[fluid], snapshot.velocity[fluid], snapshot.pressure[fluid]
+        return sampling.control_volume(*fields, box, self.spacing, 1.0, viscosity)
+
+
+def checked_box(lower: Sequence[float], upper: Sequence[float], dimensions: int) -> tuple[FloatArray, FloatArray]:
+    """Return the corners of a box.
+
+    Raises
+    ------
+    ConfigError
+        If they are none.
+    """
+    try:
+        box = np.array(lower, dtype=float), np.array(upper, dtype=float)
+    except (TypeError, ValueError):
+        box = np.empty(0), np.empty(0)
+    if not box[0].shape == box[1].shape == (dimensions,) or not np.all(box[0] < box[1]):
+        raise ConfigError(
+            f"box from {shown(lower)} to {shown(upper)}: needs corners of {dimensions} numbers, the lower one first"
+        )
+    return box
