@@ -147,7 +147,7 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Visit<Change<D>, ()> for Dis
                 }
                 _ => shift_coefficient * self.velocity_max,
             };
-            let shift = self.limited(asymmetry[lane], mean_distance, speed);
+            let shift = self.limited(i, lane, row, self.shift(asymmetry[lane], mean_distance, speed));
             let carried = correction[i].inverse * shift;
             let gradient = shown + hidden[lane] * correction[i].inverse;
             let solenoidal = self.settings.derivative_frame.solenoidal_divergence(&gradient, self.time_step);
@@ -219,12 +219,24 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Displacement<'_, K, D, SHARE
         Surroundings { asymmetry, relative, squares, total, distances, count }
     }
 
-    /// δr (18), never longer than the limit.
-    fn limited(&self, asymmetry: Vector<D>, mean_distance: f64, speed: f64) -> Vector<D> {
+    /// δr (18).
+    fn shift(&self, asymmetry: Vector<D>, mean_distance: f64, speed: f64) -> Vector<D> {
         // The h³ of the one and the h² of the other leave 1/h.
         let scale = mean_distance * mean_distance / self.settings.smoothing_length();
-        let shift = asymmetry * (scale * speed * self.time_step);
+        asymmetry * (scale * speed * self.time_step)
+    }
+
+    /// The shift of particle `i`, no longer than the limit; of one that touches a body than the way of the fastest in the step, if that
+    /// is more: a lesser shift would not keep it out where the flow stagnates.
+    fn limited(&self, i: usize, lane: usize, row: Row<'_>, shift: Vector<D>) -> Vector<D> {
         let (length, limit) = (shift.norm(), self.settings.shift_limit * self.settings.particle_spacing);
-        if length > limit { shift * (limit / length) } else { shift }
+        if length <= limit {
+            return shift;
+        }
+        let position = &self.particles.position;
+        let near = self.settings.particle_spacing; // solids stand half of it deep
+        let touches = row.solid_seen(lane).any(|(entry, _)| (position[i] - position[entry.j()]).norm() < near);
+        let limit = if touches { limit.max(self.velocity_max * self.time_step) } else { limit };
+        shift * (limit / length).min(1.0)
     }
 }

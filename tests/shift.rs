@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use alsph::boundary::Walls;
 use alsph::kernel::{QuinticSpline, Smoothing};
+use alsph::particles::{ParticleKind, Particles};
 use alsph::settings::Shifting;
 use alsph::shifting::shift;
 use alsph::{Matrix, Settings, Vector};
@@ -17,17 +18,28 @@ const VELOCITY_MAX: f64 = 1.7;
 
 /// The shift of each particle of a disordered box of vortices, and of one that is alone.
 fn shifts(settings: &Settings, time_step: f64) -> (Set<2>, Vec<Vector<2>>) {
+    shifts_beside(settings, time_step, 0.0)
+}
+
+/// The same beside a body that takes the box up to x = `wall`.
+fn shifts_beside(settings: &Settings, time_step: f64, wall: f64) -> (Set<2>, Vec<Vector<2>>) {
     let mut points = common::lattice::<2>(SIDE, 0.3);
     points.push(Vector::from([9.0, 9.0]));
-    let mut set = Set::of(common::particles(points), settings, false);
+    let mut particles = common::particles(points);
+    for i in (0..particles.real).filter(|&i| particles.position[i][0] < wall) {
+        particles.kind[i] = ParticleKind::Solid;
+    }
+    let mut set = Set::of(particles, settings, false);
     for i in 0..set.particles.real {
         let [x, y] = (TAU * set.particles.position[i]).into();
         let vortices = [x.sin() * y.cos(), -x.cos() * y.sin()];
         set.particles.velocity[i] =
             Vector::from(vortices) + 0.1 * Vector::from([(3.0 * i as f64).sin(), (2.0 * i as f64).cos()]);
     }
+    let mut walls = Walls::new(settings);
+    walls.viscous_velocity = set.particles.velocity.clone();
     let mut after = set.particles.clone();
-    shift(settings, &mut after, &set.frame, &Walls::new(settings), time_step, VELOCITY_MAX, &mut Vec::new());
+    shift(settings, &mut after, &set.frame, &walls, time_step, VELOCITY_MAX, &mut Vec::new());
     let shifts = (0..after.real).map(|i| after.position[i] - set.particles.position[i]).collect();
     (set, shifts)
 }
@@ -98,4 +110,29 @@ fn no_shift_is_longer_than_its_limit() {
     let mut settings = common::settings::<2>(1.0 / SIDE as f64, "none");
     settings.shifting = Shifting::None;
     assert!(shifts(&settings, 1.0).1.iter().all(|shift| *shift == Vector::<2>::zeros()));
+}
+
+/// Next to a body the limit is the way that the fastest particle goes in the step, if that is more.
+#[test]
+fn what_touches_a_body_may_be_shifted_by_the_way_of_the_fastest() {
+    let (spacing, wall) = (1.0 / SIDE as f64, 0.3);
+    let settings = common::settings::<2>(spacing, "none");
+    for way in [0.05 * spacing, 0.4 * spacing] {
+        let time_step = way / VELOCITY_MAX;
+        let (_, free) = shifts_beside(&settings, 1e-4, wall);
+        let (set, limited) = shifts_beside(&settings, time_step, wall);
+        let Particles { position, kind, .. } = &set.particles;
+        let (mut held, mut longer) = (0, 0);
+        for i in (0..set.particles.real).filter(|&i| kind[i] == ParticleKind::Fluid) {
+            let near = |s: usize| kind[s] == ParticleKind::Solid && (position[i] - position[s]).norm() < spacing;
+            let touches = (0..set.particles.real).any(near);
+            let limit = if touches { way.max(0.1 * spacing) } else { 0.1 * spacing };
+            let long = free[i] * (time_step / 1e-4);
+            let expected = if long.norm() > limit { long * (limit / long.norm()) } else { long };
+            assert_relative_eq!(limited[i], expected, epsilon = 1e-9 * spacing);
+            held += usize::from(!touches && long.norm() > limit);
+            longer += usize::from(touches && expected.norm() > 0.11 * spacing);
+        }
+        assert!(way < 0.1 * spacing || (held > 0 && longer > 2), "{held} {longer}");
+    }
 }

@@ -86,6 +86,35 @@ def test_symmetric_flow_past_a_square_between_lattice_lines_has_no_lift(resoluti
     assert np.abs(simulation.history()["lift_coefficient"]).max() < 1e-6
 
 
+ELLIPSE = np.stack(
+    [0.5 * np.cos(AROUND := np.linspace(0, 2 * np.pi, 100, endpoint=False)), 0.1 * np.sin(AROUND)], axis=1
+)
+
+
+@pytest.mark.parametrize(
+    ("shape", "angle", "reynolds", "resolution"),
+    [
+        ("naca0012", 5, 200, 20),
+        ("naca2412", 5, 500, 24),
+        (ELLIPSE, 10, 200, 12),
+        (ELLIPSE, 10, 1000, 16),
+        ([(-0.3, 0), (0.6, -0.35), (0.6, 0.35)], 0, 1000, 20),
+        ([(-0.5, -0.04), (0.5, -0.04), (0.5, 0.04), (-0.5, 0.04)], 10, 1000, 26),
+    ],
+)
+def test_no_particle_goes_into_a_pointed_body(shape, angle, reynolds, resolution):
+    """With the shift next to bodies held to 0.1 Δx a particle came in at the stagnation point of all of these."""
+    flow = {"length": 4, "height": 3, "upstream": 1.5, "angle_of_attack": angle}
+    case = Body(shape=shape, reynolds=reynolds, resolution=resolution, **flow)
+    simulation = case.simulation(threads=1)
+    simulation.run_until(0.9)
+    state = simulation.snapshot()
+    fluid = shapely.points(state["position"][state["kind"] == Kind.FLUID][:, :2] - case.centre)
+    body = case.carried[0]
+    inside = fluid[shapely.contains(body, fluid)]
+    assert shapely.distance(body.boundary, inside).max(initial=0) < 0.75 / resolution
+
+
 @pytest.mark.parametrize("length", [2.0, 4.0])
 def test_fluid_stays_within_a_channel_that_the_body_nearly_fills(length):
     case = Body(resolution=8, length=length, height=2.0, upstream=1.0)

@@ -76,7 +76,7 @@ pub struct Settings {
     pub shifting: Shifting,
     /// β of the maximum-velocity shift.
     pub shift_coefficient: f64,
-    /// Largest shift in a step over Δx.
+    /// Largest shift in a step over Δx; of what touches a body the way of the fastest in the step, if that is more.
     pub shift_limit: f64,
     pub wall_velocity: WallVelocity,
     pub wall_pressure: WallPressure,

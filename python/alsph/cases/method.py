@@ -167,7 +167,12 @@ class Method(Parameters):
         le=1,
         description="β of the shifting; if not given 0.75 of strain in 2-D, 0.25 in 3-D; 0.04 of maximum_velocity [-]",
     )
-    shift_limit: float = Field(default=0.1, gt=0, le=0.5, description="largest shift in a step [Δx]")
+    shift_limit: float = Field(
+        default=0.1,
+        gt=0,
+        le=0.5,
+        description="largest shift in a step [Δx]; next to a body the way of the fastest particle, if that is more",
+    )
     wall_velocity: Literal["paper", "adami", "morris", "cubic"] = Field(
         default="cubic",
         description="velocity of solid particles in the viscous term: the body's own, or extrapolated for no-slip",
