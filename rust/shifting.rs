@@ -16,6 +16,10 @@ use crate::settings::{DerivativeFrame, Settings, Shifting};
 /// vortices: enough to keep the spacing even, and no noise.
 const MIXING: f64 = 1.0 / 3.0;
 
+/// Distance to the nearest solid particle [Δx] at which a particle touches the body, and that at which it does not at all; solids stand
+/// half a spacing deep. A sharp limit in place of the two makes the lift noisy.
+const TOUCH: [f64; 2] = [0.75, 1.25];
+
 /// Displace the fluid particles towards an even spacing and carry velocity and pressure along to first order.
 /// `particles` stand at r^{n+1}; the derivatives are those of `frame`, where solids show the velocity of the viscous term: the
 /// velocity at rest would make ∇u too small next to a wall, and the displacement mix the boundary layer. `change` is what the particles were last changed by, kept
@@ -234,9 +238,10 @@ impl<K: Kernel, const D: usize, const SHARED: bool> Displacement<'_, K, D, SHARE
             return shift;
         }
         let position = &self.particles.position;
-        let near = self.settings.particle_spacing; // solids stand half of it deep
-        let touches = row.solid_seen(lane).any(|(entry, _)| (position[i] - position[entry.j()]).norm() < near);
-        let limit = if touches { limit.max(self.velocity_max * self.time_step) } else { limit };
+        let solids = row.solid_seen(lane).map(|(entry, _)| (position[i] - position[entry.j()]).norm());
+        let nearest = solids.fold(f64::INFINITY, f64::min) / self.settings.particle_spacing;
+        let touching = ((TOUCH[1] - nearest) / (TOUCH[1] - TOUCH[0])).clamp(0.0, 1.0);
+        let limit = limit + touching * (self.velocity_max * self.time_step - limit).max(0.0);
         shift * (limit / length).min(1.0)
     }
 }
