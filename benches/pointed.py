@@ -1,7 +1,9 @@
 """Flow past bodies with points and edges, from rest: which of them break down.
 
-python benches/pointed.py                      # defaults: ten minutes
-python benches/pointed.py --set shift_limit=0.3 --until 3
+    python benches/pointed.py                      # defaults: five minutes
+    python benches/pointed.py --set shift_limit=0.3 --until 3
+
+In small channels, from an impulsive start, where particles come nearest to the bodies.
 """
 
 import argparse
