@@ -3,6 +3,7 @@
 use crate::base::Vector;
 use crate::base::parallel;
 use crate::boundary::Walls;
+use crate::forcing::BodyForce;
 use crate::frame::Frame;
 use crate::particles::Particles;
 use crate::settings::Settings;
@@ -24,6 +25,7 @@ pub struct Flow<const D: usize> {
     pub frame: Frame<D>,
     pub walls: Walls<D>,
     pub before: Before<D>,
+    pub body_force: BodyForce<D>,
 }
 
 /// r^n, u^n, p^n of the real particles.
@@ -36,7 +38,8 @@ pub struct Before<const D: usize> {
 
 impl<const D: usize> Flow<D> {
     pub fn new(settings: &Settings, particles: Particles<D>) -> Self {
-        Self { particles, frame: Frame::default(), walls: Walls::new(settings), before: Before::default() }
+        let (frame, before) = (Frame::default(), Before::default());
+        Self { particles, frame, walls: Walls::new(settings), before, body_force: BodyForce::new(settings) }
     }
 
     /// Keep the state before a step, whose frame may stand in the middle of it.

@@ -10,6 +10,7 @@ pub mod breakdown;
 pub mod discretisation;
 pub mod faces;
 pub mod flow;
+pub mod forcing;
 pub mod frame;
 pub mod halo;
 mod interpolation;

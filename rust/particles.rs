@@ -121,7 +121,7 @@ impl<const D: usize> Particles<D> {
 
     /// Take what has passed the end of its body's belt back to the beginning.
     pub fn go_round(&mut self, bodies: &[Body]) {
-        let own = |body: &Body| body.belt.map(|belt| (belt, Vector::<D>::from_fn(|axis, _| body.velocity[axis])));
+        let own = |body: &Body| Some((body.belt?, Vector::<D>::from_column_slice(body.velocity.as_deref()?)));
         let belts: Vec<_> = bodies.iter().map(own).collect();
         for i in (0..self.real).filter(|&i| self.kind[i] == ParticleKind::Solid) {
             let Some(([from, to], velocity)) = belts[self.body[i] as usize] else { continue };

@@ -8,6 +8,7 @@ use crate::boundary;
 use crate::breakdown::{self, Symptom};
 use crate::discretisation::VelocityGradient;
 use crate::flow::{Flow, Step};
+use crate::forcing::Forcing;
 use crate::frame::Travel;
 use crate::interpolation::interpolate;
 use crate::loads::loads;
@@ -33,6 +34,8 @@ pub struct Simulation<const D: usize> {
     flow: Flow<D>,
     clock: Clock,
     scheme: Box<dyn Scheme<D>>,
+    /// What is prescribed by place and time, beside the inflow.
+    pub forcing: Forcing<D>,
     change: Vec<Change<D>>,
     /// Whether `frame` belongs to the present positions.
     prepared: bool,
@@ -74,6 +77,7 @@ impl<const D: usize> Simulation<D> {
         Ok(Self {
             flow: Flow::new(&settings, particles),
             scheme,
+            forcing: Forcing::default(),
             settings,
             clock,
             change: Vec::new(),
@@ -148,7 +152,15 @@ impl<const D: usize> Simulation<D> {
         self.prepare_step(Travel { time_step, velocity_max, fraction: self.settings.derivative_frame.fraction() });
         let step = Step { settings: &self.settings, time_step, velocity_max };
         let (flow, scheme) = (&mut self.flow, &mut self.scheme);
+        let Flow { particles, frame, body_force, .. } = &mut *flow;
+        let middle = self.clock.time + 0.5 * time_step;
+        let prescribed = self.forcing.apply(step.settings, particles, frame, body_force, middle);
         flow.remember();
+        if let Err(error) = prescribed {
+            flow.restore();
+            self.prepared = false;
+            return Err(error);
+        }
 
         let iterations = scheme.solve(step, flow);
         if let Some(symptom) = breakdown::find(step.settings, &flow.particles, &flow.frame, time_step) {
@@ -323,7 +335,7 @@ pub struct Snapshot<const D: usize> {
     pub velocity_gradient: Vec<Matrix<D>>,
 }
 
-/// Refuse arrays that cannot be simulated; give solid particles the velocity of their body.
+/// Refuse arrays that cannot be simulated; give solid particles the velocity of their body, if it has one.
 fn check_particles<const D: usize>(settings: &Settings, particles: &mut Particles<D>) -> Result<()> {
     let array = |name, problem| Err(Error::Array { name, problem });
     particles.real = particles.len();
@@ -347,7 +359,9 @@ fn check_particles<const D: usize>(settings: &Settings, particles: &mut Particle
                     format!("particle {i} belongs to body {}, of {}", particles.body[i], settings.bodies.len()),
                 );
             };
-            particles.velocity[i] = Vector::from_column_slice(&body.velocity);
+            if let Some(velocity) = &body.velocity {
+                particles.velocity[i] = Vector::from_column_slice(velocity);
+            }
             let along = particles.velocity[i].try_normalize(0.0).map_or(0.0, |along| along.dot(&particles.position[i]));
             let slack = 1e-6 * settings.particle_spacing;
             if let Some([from, to]) = body.belt.filter(|[from, to]| !(from - slack..=to + slack).contains(&along)) {

@@ -3,6 +3,7 @@
 use alsph::boundary::{Walls, end_step};
 use alsph::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient};
 use alsph::flow::{Before, Flow, Step};
+use alsph::forcing::BodyForce;
 use alsph::frame::{Frame, Travel};
 use alsph::kernel::{QuinticSpline, Smoothing};
 use alsph::neighbours::Grid;
@@ -262,7 +263,7 @@ fn with_buffers(particles: &mut Particles<2>) {
 
 fn first_flow(settings: &Settings, start: Particles<2>) -> Flow<2> {
     let Set { particles, frame } = first_frame(settings, start);
-    Flow { particles, frame, walls: Walls::new(settings), before: Before::default() }
+    Flow { particles, frame, walls: Walls::new(settings), before: Before::default(), body_force: BodyForce::new(settings) }
 }
 
 /// Without viscosity a step changes the velocity by the gradient of the acting pressure, with sweeps and without, and says what
@@ -282,7 +283,7 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
         for _ in 0..2 {
             flow.remember();
             let iterations = scheme.solve(step, &mut flow);
-            let Flow { particles, frame, walls, before } = flow;
+            let Flow { particles, frame, walls, before, body_force } = flow;
             let acting: Vec<_> = (0..particles.len()).map(|i| scheme.acting_pressure(step, &particles, i)).collect();
             let seen = acting.iter().zip(&particles.pressure).any(|(acting, p)| (acting - p).abs() > 1e-3);
             assert!(seen, "nothing to be seen");
@@ -296,7 +297,7 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
             assert_relative_eq!(outcome.divergence_max, divergence.clone().fold(0.0, f64::max), epsilon = 1e-12);
             assert_relative_eq!(outcome.divergence_sum, divergence.sum::<f64>(), max_relative = 1e-9);
             let Set { particles, frame } = set;
-            flow = Flow { particles, frame, walls, before };
+            flow = Flow { particles, frame, walls, before, body_force };
         }
     }
 }
@@ -500,7 +501,7 @@ fn a_shift_finds_the_divergence_that_the_iterations_leave() {
 
 /// The velocities that a step begins with: those of solids are their body's.
 fn stepped_from(settings: &Settings, particles: &Particles<2>) -> Vec<Vector<2>> {
-    let body = Vector::from_column_slice(&settings.bodies[0].velocity);
+    let body = Vector::from_column_slice(settings.bodies[0].velocity.as_deref().expect("given"));
     let solid = |i: usize| particles.kind[i] == ParticleKind::Solid;
     (0..particles.real).map(|i| if solid(i) { body } else { particles.velocity[i] }).collect()
 }

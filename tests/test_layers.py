@@ -17,6 +17,7 @@ FLOORS = (
     ("halo", "neighbours"),
     ("discretisation", "faces"),
     ("frame",),
+    ("forcing",),
     ("boundary", "breakdown", "interpolation"),
     ("flow",),
     ("loads", "shifting"),

@@ -51,6 +51,20 @@ def test_a_body_too_thin_for_the_resolution_is_refused(tmp_path, thickness):
         assert Body(shape=path, resolution=enough, **CHANNEL).carried[0].area == pytest.approx(thickness, rel=0.01)
 
 
+@pytest.mark.parametrize("shape", ["naca0012", "naca2412", [(-1, 0), (1, -0.15), (1, 0.15)]])
+def test_a_body_of_which_less_than_half_is_left_is_refused(shape):
+    for resolution in range(8, 20):
+        case = Body(shape=shape, resolution=resolution, **CHANNEL)
+        left = sum(body.area for body in case.carried) / case.outline.area
+        refusal = [remark for remark in case.remarks() if remark.startswith("too thin")]
+        assert bool(refusal) == (left < 0.5)
+        if not refusal:
+            break
+        enough = int(refusal[0].split("resolution = ")[1].split()[0])
+        assert left == 0 or f"{100 * left:.2g} % of it is left" in refusal[0]
+    assert resolution == enough  # the first that is carried
+
+
 @pytest.mark.parametrize("thickness", [0.2, 0.25, 0.3, 0.4])
 def test_a_thin_plate_is_filled_and_has_two_faces(tmp_path, thickness):
     (solid,) = Body(shape=plate(tmp_path, thickness), resolution=10, **CHANNEL).solids()

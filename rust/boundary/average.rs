@@ -2,6 +2,7 @@
 
 use crate::base::Vector;
 use crate::discretisation::Stencil;
+use crate::forcing::BodyForce;
 use crate::frame::Frame;
 use crate::halo::{Mirrored, Poison};
 use crate::kernel::{Smoothing, with_kernel};
@@ -75,9 +76,10 @@ pub fn extrapolate_pressure<const D: usize>(
     frame: &Frame<D>,
     Particles { real, kind, pressure, .. }: &mut Particles<D>,
     gradient: &[Vector<D>],
+    body_force: &BodyForce<D>,
 ) {
-    let hydrostatic = Vector::<D>::from_column_slice(&settings.body_force) * settings.density;
-    let slope = |j: usize| if settings.wall_pressure == WallPressure::Linear { gradient[j] } else { hydrostatic };
+    let linear = settings.wall_pressure == WallPressure::Linear;
+    let slope = |j: usize| if linear { gradient[j] } else { body_force.at(j) * settings.density };
     let continued = |pressure: &[f64], j: usize, r_ij: Vector<D>| [pressure[j] + slope(j).dot(&r_ij)];
     extrapolate(settings, frame, &kind[..*real], pressure, continued, |[pressure]| pressure);
 }

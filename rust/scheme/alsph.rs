@@ -191,8 +191,7 @@ impl<const D: usize> Alsph<D> {
     }
 
     /// u* (8), and ∇²p^m for (10), which reads the same neighbours.
-    fn predict_velocity(&mut self, step: Step, Flow { particles, frame, before, .. }: &Flow<D>) {
-        let gravity = Vector::<D>::from_column_slice(&step.settings.body_force);
+    fn predict_velocity(&mut self, step: Step, Flow { particles, frame, before, body_force, .. }: &Flow<D>) {
         let (dt, viscosity) = (step.time_step, step.settings.kinematic_viscosity);
         let condition = conditions(step.settings);
         let (initial, derived, r_al) = (&before.velocity, &self.derived, self.coefficients.penalty);
@@ -208,7 +207,8 @@ impl<const D: usize> Alsph<D> {
                     PressureRule::Zero | PressureRule::FromFluid => initial[i],
                     PressureRule::Solved | PressureRule::SolvedWithoutDivergence => {
                         initial[i]
-                            + (penalty * r_al + (derived[i].laplacian * theta + explicit(i)) * viscosity + gravity) * dt
+                            + (penalty * r_al + (derived[i].laplacian * theta + explicit(i)) * viscosity + body_force.at(i))
+                                * dt
                     }
                 };
             },
@@ -217,7 +217,8 @@ impl<const D: usize> Alsph<D> {
     }
 
     /// p^{m+1} (10), with the pressure of solid particles (20).
-    fn update_pressure(&mut self, step: Step, Flow { particles, frame, before, .. }: &mut Flow<D>) {
+    fn update_pressure(&mut self, step: Step, flow: &mut Flow<D>) {
+        let Flow { particles, frame, before, body_force, .. } = flow;
         if step.settings.wall_pressure == WallPressure::Linear {
             let gradient = &mut self.pressure_gradient;
             frame.images.blank(gradient, particles.len());
@@ -248,7 +249,7 @@ impl<const D: usize> Alsph<D> {
         if paper_walls {
             frame.images.fill(pressure);
         } else {
-            extrapolate_pressure(settings, frame, particles, &self.pressure_gradient);
+            extrapolate_pressure(settings, frame, particles, &self.pressure_gradient, body_force);
         }
     }
 

@@ -94,7 +94,8 @@ impl<const D: usize> WeaklyCompressible<D> {
     }
 
     /// The pressure that solids show.
-    fn extrapolate_wall_pressure(&mut self, settings: &Settings, Flow { particles, frame, .. }: &mut Flow<D>) {
+    fn extrapolate_wall_pressure(&mut self, settings: &Settings, flow: &mut Flow<D>) {
+        let Flow { particles, frame, body_force, .. } = flow;
         frame.images.fill(&mut particles.pressure);
         if settings.wall_pressure == WallPressure::Linear {
             let gradient = &mut self.near_walls;
@@ -102,11 +103,11 @@ impl<const D: usize> WeaklyCompressible<D> {
             frame.stencil.evaluate_near_solids(Gradient(&particles.pressure), frame.images.real(gradient));
             frame.images.fill(gradient);
         }
-        extrapolate_pressure(settings, frame, particles, &self.near_walls);
+        extrapolate_pressure(settings, frame, particles, &self.near_walls, body_force);
     }
 
     /// u^{n+1} by the pressure in the middle of the step. Buffers and solids keep their velocities.
-    fn advance_velocity(&mut self, step: Step, Flow { particles, frame, .. }: &mut Flow<D>) {
+    fn advance_velocity(&mut self, step: Step, Flow { particles, frame, body_force, .. }: &mut Flow<D>) {
         let settings = step.settings;
         self.pressure.clear();
         self.pressure.extend(particles.pressure.iter().map(|&p| [p; 2]));
@@ -118,13 +119,12 @@ impl<const D: usize> WeaklyCompressible<D> {
             &mut self.diffusing,
             |_, values, gradient, laplacian| (*gradient, *laplacian) = values,
         );
-        let gravity = Vector::<D>::from_column_slice(&settings.body_force);
         let sharper = |i: usize| self.sharper.get(i).copied().unwrap_or_else(Vector::zeros);
         let (kind, position, condition) = (&particles.kind, &particles.position, conditions(settings));
         parallel::for_each(frame.images.real(&mut particles.velocity), |i, u| {
             if condition(kind[i], &position[i]).velocity == VelocityRule::Solved {
                 let viscous = (self.laplacian[i] + sharper(i)) * settings.kinematic_viscosity;
-                *u += (viscous - self.gradient[i] / settings.density + gravity) * step.time_step;
+                *u += (viscous - self.gradient[i] / settings.density + body_force.at(i)) * step.time_step;
             }
         });
         frame.images.fill(&mut particles.velocity);

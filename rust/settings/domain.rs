@@ -28,8 +28,8 @@ pub struct Domain {
 #[serde(deny_unknown_fields)]
 pub struct Body {
     pub name: String,
-    /// Prescribed velocity.
-    pub velocity: Vec<f64>,
+    /// Prescribed velocity; if null, that of the particles, which a rule may prescribe, of a body that does not move.
+    pub velocity: Option<Vec<f64>>,
     /// Whether the particles move with that velocity.
     pub moves: bool,
     /// Where the particles of a body that moves go round, from and to, coordinates along its velocity: those that pass the end come back at
@@ -68,7 +68,12 @@ pub(super) fn validate_bodies(bodies: &[Body], dimensions: usize) -> Result<()> 
         if bodies[..k].iter().any(|other| other.name == body.name) {
             return Err(setting("bodies", format!("two are named \"{}\"; names must differ", body.name)));
         }
-        validate_vector(&format!("bodies.{}.velocity", body.name), &body.velocity, dimensions)?;
+        let name = format!("bodies.{}.velocity", body.name);
+        match &body.velocity {
+            Some(velocity) => validate_vector(&name, velocity, dimensions)?,
+            None if body.moves => return Err(setting(name, "must be given for a body that moves")),
+            None => {}
+        }
         validate_vector(&format!("bodies.{}.center", body.name), &body.center, dimensions)?;
         if body.belt.is_some_and(|[from, to]| !(body.moves && from.is_finite() && to.is_finite() && from < to)) {
             return Err(setting(

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from alsph.geometry.thin import THINNEST, thickness
+from alsph.geometry.thin import THINNEST, carried, thickness
 
 LAYER = 1.2
 """Thickness of the boundary layer at the front of a cylinder over √(νD/U): 2.4 √(ν/a) in stagnation-point flow
@@ -45,6 +45,9 @@ CLOSEST = 4.0
 
 TOO_THIN = "too thin"
 """What is remarked on a body that the resolution does not carry, and refused."""
+
+LEAST_LEFT = 0.5
+"""Share of its area below which what the resolution carries of a body is no longer that body."""
 
 THICK = 8.0
 """Thickness of a body [Δx] from which its recorded loads have met the momentum balance within 3 % (docs/results.md)."""
@@ -197,27 +200,30 @@ def thinnest(shape: Polygon | MultiPolygon) -> float:
     return thin
 
 
-def thin(name: str, shape: Polygon, carried: Polygon | MultiPolygon, spacing: float) -> list[str]:
+def thin(name: str, shape: Polygon, left: Polygon | MultiPolygon, spacing: float) -> list[str]:
     """Remark on what the resolution cuts off a body, and on loads that two near faces make uncertain (lengths in D).
 
     Parameters
     ----------
     name
         Name of the body.
-    shape, carried
+    shape, left
         The body, and what is carried of it.
     spacing : float
         Particle spacing Δx.
     """
     thick = thickness(shape)
-    if carried.is_empty:
-        text = f"the {name} is at most {thick:.3g} D or {thick / spacing:.3g} Δx thick, the flow would go through it"
+    if left.area < LEAST_LEFT * shape.area:
+        lost = "the flow would go through it"
+        if not left.is_empty:
+            lost = f"without what is thinner than {THINNEST:g} Δx {100 * left.area / shape.area:.2g} % of it is left"
         return [
-            f"{TOO_THIN}: {text}; it takes {THINNEST:g} Δx, resolution = {math.ceil(THINNEST / thick - 0.05)} or more"
+            f"{TOO_THIN}: the {name} is at most {thick:.3g} D or {thick / spacing:.3g} Δx thick, {lost}; "
+            f"use resolution = {_coarsest(shape, thick)} or more"
         ]
     found = []
-    length, area = reach(shape, carried, 0.5 * spacing), 1 - carried.area / shape.area
-    pieces = len(shapely.get_parts(carried))
+    length, area = reach(shape, left, 0.5 * spacing), 1 - left.area / shape.area
+    pieces = len(shapely.get_parts(left))
     if length > spacing or pieces > 1:
         text = f"cut off, for they are thinner than 2 Δx: up to {length:.2g} D of tips, {100 * area:.2g} % of the area"
         if pieces > 1:
@@ -227,6 +233,14 @@ def thin(name: str, shape: Polygon, carried: Polygon | MultiPolygon, spacing: fl
         known = "lift and drag were found off by 20 to 30 % below 3 Δx, by 4 % at 5 Δx"
         found.append(f"thin body: {thick / spacing:.2g} Δx at its thickest; {known}; use a finer resolution")
     return found
+
+
+def _coarsest(shape: Polygon, thick: float) -> int:
+    """Return the least resolution that carries enough of a body of a given thickness [D], which all finer ones do."""
+    resolution = math.ceil(THINNEST / thick - 0.05)
+    while carried(shape, 1 / resolution).area < LEAST_LEFT * shape.area:
+        resolution += 1 + resolution // 50
+    return resolution
 
 
 def derived(model: type) -> list[str]:
