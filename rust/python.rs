@@ -2,6 +2,7 @@
 
 use crate::base::lanes::{Instructions, LANES};
 use crate::base::{Error, Matrix, Vector};
+use crate::forcing::{Forcing, Rule};
 use crate::kernel::KernelKind;
 use crate::loads::Load;
 use crate::neighbours::Entry;
@@ -15,6 +16,7 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 create_exception!(
@@ -61,7 +63,13 @@ macro_rules! engine {
 
 /// State and stepping of one simulation in 2-D or 3-D.
 #[pyclass(name = "Simulation", module = "alsph._alsph")]
-struct PySimulation(Engine);
+struct PySimulation {
+    engine: Engine,
+    /// What a function of the caller's has raised in the engine.
+    raised: Raised,
+}
+
+type Raised = Arc<Mutex<Option<PyErr>>>;
 
 #[pymethods]
 impl PySimulation {
@@ -71,36 +79,37 @@ impl PySimulation {
         let settings = Settings::from_json(settings)?;
         let threads = threads.map(read_threads).transpose()?;
         let clock = read_clock(state)?;
-        Ok(Self(match settings.dimensions {
+        let engine = match settings.dimensions {
             2 => Engine::Two(Box::new(Simulation::new(settings, read_particles(state)?, clock, threads)?)),
             _ => Engine::Three(Box::new(Simulation::new(settings, read_particles(state)?, clock, threads)?)),
-        }))
+        };
+        Ok(Self { engine, raised: Raised::default() })
     }
 
     #[getter]
     fn dimensions(&self) -> usize {
-        engine!(&self.0, s => s.settings().dimensions)
+        engine!(&self.engine, s => s.settings().dimensions)
     }
 
     #[getter]
     fn time(&self) -> f64 {
-        engine!(&self.0, s => s.clock().time)
+        engine!(&self.engine, s => s.clock().time)
     }
 
     #[getter]
     fn step(&self) -> u64 {
-        engine!(&self.0, s => s.clock().step)
+        engine!(&self.engine, s => s.clock().step)
     }
 
     #[getter]
     fn threads(&self) -> usize {
-        engine!(&self.0, s => s.threads())
+        engine!(&self.engine, s => s.threads())
     }
 
     /// Particles by kind: ``fluid``, ``inlet``, ``outlet``, ``solid``.
     #[getter]
     fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let counts = engine!(&self.0, s => s.particles().counts());
+        let counts = engine!(&self.engine, s => s.particles().counts());
         let dict = PyDict::new(py);
         for (name, count) in ParticleKind::NAMES.iter().zip(counts) {
             dict.set_item(name, count)?;
@@ -112,7 +121,8 @@ impl PySimulation {
     #[pyo3(signature = (steps, wall_seconds=None))]
     fn advance(&mut self, py: Python<'_>, steps: u64, wall_seconds: Option<f64>) -> PyResult<u64> {
         let wall = wall(wall_seconds)?;
-        Ok(engine!(&mut self.0, s => py.detach(|| s.advance(steps, wall)))?)
+        let taken = engine!(&mut self.engine, s => py.detach(|| s.advance(steps, wall)));
+        self.or_raised(taken)
     }
 
     /// Step until ``self.time >= time`` (True) or `wall_seconds` have passed (False). Δt is never clipped to `time`.
@@ -122,12 +132,13 @@ impl PySimulation {
             return Err(ConfigError::new_err("argument `time`: must be a number, not NaN"));
         }
         let wall = wall(wall_seconds)?;
-        Ok(engine!(&mut self.0, s => py.detach(|| s.advance_until(time, wall)))?)
+        let reached = engine!(&mut self.engine, s => py.detach(|| s.advance_until(time, wall)));
+        self.or_raised(reached)
     }
 
     /// One row for each step since the last call, see docs/architecture.md for the columns.
     fn take_history<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        engine!(&mut self.0, s => {
+        engine!(&mut self.engine, s => {
             let bodies = s.settings().bodies.len();
             history(py, &s.take_history(), bodies)
         })
@@ -135,7 +146,7 @@ impl PySimulation {
 
     /// Return the particles: the arrays of `state` and ``volume``, ``velocity_divergence``, ``vorticity``.
     fn snapshot<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        match &mut self.0 {
+        match &mut self.engine {
             Engine::Two(s) => plane_snapshot(py, s),
             Engine::Three(s) => space_snapshot(py, s),
         }
@@ -143,7 +154,7 @@ impl PySimulation {
 
     /// The same for what the step that broke down led to, at the positions before that step; None if none has.
     fn failed_snapshot<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        match &mut self.0 {
+        match &mut self.engine {
             Engine::Two(s) => s.look_at_failed(|s| plane_snapshot(py, s)).transpose(),
             Engine::Three(s) => s.look_at_failed(|s| space_snapshot(py, s)).transpose(),
         }
@@ -151,12 +162,12 @@ impl PySimulation {
 
     /// All that is needed to go on from here to the last bit.
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        engine!(&self.0, s => state(py, s.particles(), s.clock()))
+        engine!(&self.engine, s => state(py, s.particles(), s.clock()))
     }
 
     /// Fluid ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d), quadratic moving least squares; NaN without neighbours.
     fn sample<'py>(&mut self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
-        engine!(&mut self.0, s => {
+        engine!(&mut self.engine, s => {
             let points = read_vectors("points", points)?;
             let values = py.detach(|| s.sample(&points));
             let dict = PyDict::new(py);
@@ -168,12 +179,12 @@ impl PySimulation {
 
     /// Return the positions (m, d) of the inlet buffer particles.
     fn inflow_position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        engine!(&self.0, s => vectors(py, s.inflow_position().into_iter()))
+        engine!(&self.engine, s => vectors(py, s.inflow_position().into_iter()))
     }
 
     /// Prescribe the velocity of the inlet buffer particles, (d,) or (m, d) in the order of `inflow_position`.
     fn set_inflow(&mut self, velocity: &Bound<'_, PyAny>) -> PyResult<()> {
-        engine!(&mut self.0, s => {
+        engine!(&mut self.engine, s => {
             let velocity = match velocity.extract::<PyReadonlyArray1<f64>>() {
                 Ok(same) => vec![vector("inflow velocity", same.as_array().iter().copied())?; s.inflow_position().len()],
                 Err(_) => read_vectors("inflow velocity", velocity)?,
@@ -181,6 +192,40 @@ impl PySimulation {
             Ok(s.set_inflow(&velocity)?)
         })
     }
+
+    /// Ask functions, once a step, for a body force per unit mass beside that of the settings, and the velocity of surfaces that stay
+    /// in place: (m, d) from positions (m, d) and the time.
+    #[pyo3(signature = (forcing, sliding))]
+    fn prescribe(&mut self, forcing: Option<Py<PyAny>>, sliding: Option<Py<PyAny>>) {
+        let raised = &self.raised;
+        engine!(&mut self.engine, s => s.forcing = Forcing {
+            body_force: forcing.map(|function| rule("body force", function, Arc::clone(raised))),
+            surface_velocity: sliding.map(|function| rule("surface velocity", function, Arc::clone(raised))),
+        });
+    }
+}
+
+impl PySimulation {
+    /// `result`, or what a function of the caller's has raised.
+    fn or_raised<T>(&self, result: crate::Result<T>) -> PyResult<T> {
+        let raised = self.raised.lock().ok().and_then(|mut raised| raised.take());
+        result.map_err(|error| raised.unwrap_or_else(|| error.into()))
+    }
+}
+
+/// The rule that a function of the caller's gives. What that raises is kept for the thread that called the engine.
+fn rule<const D: usize>(name: &'static str, function: Py<PyAny>, raised: Raised) -> Rule<D> {
+    Box::new(move |position, time| {
+        Python::attach(|py| {
+            let values = function.call1(py, (vectors(py, position.iter().copied()), time));
+            values.and_then(|values| read_vectors(name, values.bind(py))).map_err(|error| {
+                if let Ok(mut raised) = raised.lock() {
+                    *raised = Some(error);
+                }
+                Error::Array { name, problem: "its function has failed".into() }
+            })
+        })
+    })
 }
 
 /// Bounds of Δt: ``courant``, ``penalty``, ``acoustic``, ``viscous``, ``body_force`` (inf where it does not apply), and ``lambda_max`` (λ_max Δx²).

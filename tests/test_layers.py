@@ -95,7 +95,7 @@ PYTHON = Path(__file__).parents[1] / "python" / "alsph"
 PYTHON_FLOORS = (
     ("_alsph", "arrays", "text"),
     ("errors",),
-    ("memory", "parameters", "tables"),
+    ("memory", "parameters", "tables", "expressions"),
     ("geometry", "reference"),
     ("analysis", "engine"),
     ("cases", "folder"),

@@ -1,4 +1,4 @@
-"""A run folder needs nothing but itself: the inflow's rule, and what the run began with."""
+"""A run folder needs nothing but itself: what rules prescribe, and what the run began with."""
 
 import json
 import re
@@ -11,7 +11,7 @@ import pytest
 from alsph import config
 from alsph.cases import CASES, BackwardFacingStep, Cylinder, TaylorGreen
 from alsph.config import Config, RunSettings
-from alsph.engine.inflow import Prescription, backflow, difference, fingerprint
+from alsph.engine.prescribed import Prescription, backflow, difference, fingerprint
 from alsph.errors import ConfigError, RunFolderError, SolverError
 from alsph.folder.run_folder import RunFolder
 from alsph.geometry.particles import Kind
@@ -63,6 +63,34 @@ class Prescribed(Cylinder):
         return simulation
 
 
+class Told(Cylinder):
+    """An expression, of the same values."""
+
+    name = "told"
+    inlet_velocity: str | None = "1 + 0.3*sin(20*t)*cos(y), 0"
+
+
+class Driven(Pulsing):
+    """A body force and a sliding surface, too."""
+
+    name = "driven"
+
+    def forcing(self, position, time):
+        return 0.5 * pulsation(position, time)
+
+    def sliding(self, position, time):
+        x, y = (position - self.centre).T
+        return np.cos(10 * time) * np.stack([-y, x], axis=1)
+
+
+class Turning(Told):
+    """The same by expressions."""
+
+    name = "turning"
+    driving_force: str | None = "0.5*(1 + 0.3*sin(20*t)*cos(y)), 0"
+    surface_velocity: str | None = "-y*cos(10*t), (x - upstream)*cos(10*t)"
+
+
 class Constant(Cylinder):
     """An array, which the particles keep and hand on."""
 
@@ -76,7 +104,7 @@ class Constant(Cylinder):
 
 def expected(case, position, time):
     """Return the velocity of inlet particles after a step from that time on."""
-    if isinstance(case, Pulsing | Prescribed):
+    if isinstance(case, Pulsing | Prescribed | Told):
         return pulsation(position, time)
     return pulsation(position, 0.05 if isinstance(case, Sheared | Constant) else 0.0)
 
@@ -89,9 +117,12 @@ def assert_inflow(path, case):
     assert state["velocity"][inlet] == pytest.approx(known, abs=1e-8)
 
 
-@pytest.fixture(params=[Cylinder, Sheared, Constant, Pulsing, Prescribed], ids=lambda model: model.__name__)
+ALL = Sheared, Constant, Pulsing, Prescribed, Told, Driven, Turning
+
+
+@pytest.fixture(params=[Cylinder, *ALL], ids=lambda model: model.__name__)
 def case(request, monkeypatch):
-    for model in (Sheared, Constant, Pulsing, Prescribed):
+    for model in ALL:
         monkeypatch.setitem(CASES, model.name, model)
     return request.param(**SMALL)
 
@@ -175,6 +206,20 @@ def test_a_run_does_not_go_on_without_its_inflow(monkeypatch, tmp_path, model):
         resume(path, until=0.1, progress=False)
 
 
+@pytest.mark.parametrize(("rule", "what"), [("forcing", "body force"), ("sliding", "velocity of surfaces")])
+def test_a_body_force_and_sliding_surfaces_are_not_lost_either(monkeypatch, tmp_path, rule, what):
+    monkeypatch.setitem(CASES, Driven.name, Driven)
+    path = Driven(**SMALL).run(tmp_path / "run", until=0.05, progress=False).path
+    monkeypatch.setattr(Driven, rule, lambda self, position, time: [0.1, 0.0])
+    with pytest.warns(RuntimeWarning, match=f"goes on with another {what}: at t.* its values differ by up to"):
+        resume(path, until=0.06, progress=False)
+    monkeypatch.setattr(Driven, rule, getattr(Cylinder, rule))
+    with pytest.raises(RunFolderError, match=f"prescribes the {what} of the run.* make it the method `{rule}`"):
+        resume(path, until=0.1, progress=False)
+    with pytest.raises(RunFolderError, match=f"cannot be repeated because a function prescribes its {what}"):
+        alsph.repeat(path, progress=False)
+
+
 def test_another_inflow_is_told(monkeypatch, tmp_path):
     monkeypatch.setitem(CASES, Prescribed.name, Prescribed)
     case, path = Prescribed(**SMALL), tmp_path / "run"
@@ -228,25 +273,35 @@ def test_an_inflow_is_part_of_what_studies_compare(monkeypatch):
     assert digest(Config(case.replace(strength=0.2))) != first
     monkeypatch.setattr(Pulsing, "inflow", lambda self, position, time: pulsation(position, 1.001 * time))
     assert digest(Config(case)) != first
-    assert fingerprint(lambda position, time: None, case.domain(), 1.0)
+    assert fingerprint("inflow", lambda position, time: None, case.domain(), 1.0)
+    driven = Driven(**SMALL)
+    first = digest(Config(driven))
+    monkeypatch.setattr(Driven, "forcing", lambda self, position, time: 0.501 * pulsation(position, time))
+    assert digest(Config(driven)) != first
+    cylinder = Cylinder(**SMALL)
+    turning = [digest(Config(cylinder.replace(surface_velocity=f"-{speed}*y, x - 2"))) for speed in (1, 1, 2)]
+    assert turning[0] == turning[1] != turning[2] and digest(Config(cylinder)) not in turning
 
 
 @pytest.mark.parametrize("velocity", ["fast", [1.0, 0.0, 0.0], np.ones((3, 2))], ids=["text", "3-D", "rows"])
 def test_a_rule_that_gives_no_velocities_is_told_so_wherever_it_is_asked(small, velocity):
     then = Prescription(0.1, np.zeros((5, 2)), np.ones((5, 2)))
     with pytest.raises(ConfigError, match="inflow: the function must give 2 numbers"):
-        difference(lambda position, time: velocity, then)
+        difference({"inflow": lambda position, time: velocity}, {"inflow": then})
     with pytest.raises(ConfigError, match="inflow: the function must give 2 numbers"):
-        fingerprint(lambda position, time: velocity, small.domain(), 1.0)
+        fingerprint("inflow", lambda position, time: velocity, small.domain(), 1.0)
+    for name in ("forcing", "sliding"):
+        with pytest.raises(ConfigError, match=f"{name}: the function must give 2 numbers"):
+            fingerprint(name, lambda position, time: None, small.domain(), 1.0)
 
 
 def test_checkpoints_without_a_rule_are_as_before(tmp_path, small):
     """And those of an older alsph, which had none, go on."""
     path = small.run(tmp_path / "run", until=0.05, progress=False).path
-    assert RunFolder(path).read_checkpoint().inflow is None
-    assert difference(None, None) == ""
+    assert RunFolder(path).read_checkpoint().prescribed == {}
+    assert difference({}, {}) == ""
     info = RunFolder(path).info()
-    for name in ("start", "case_class", "inflow_function"):
+    for name in ("start", "case_class", "rules"):
         del info[name]
     (path / "run.json").write_text(json.dumps(info))
     assert alsph.repeat(path, progress=False).same

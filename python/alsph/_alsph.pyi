@@ -1,5 +1,6 @@
 """The compiled engine (Rust). Use it through :class:`alsph.Simulation`."""
 
+from collections.abc import Callable
 from typing import Any, Self, final
 
 import numpy as np
@@ -67,6 +68,13 @@ class Simulation:
 
     def inflow_position(self) -> NDArray[np.float64]:
         """Return the positions (m, d) of the inlet buffer particles."""
+
+    def prescribe(
+        self,
+        forcing: Callable[[NDArray[np.float64], float], NDArray[np.float64]] | None,
+        sliding: Callable[[NDArray[np.float64], float], NDArray[np.float64]] | None,
+    ) -> None:
+        """Ask functions, once a step, for a body force and the velocity of surfaces: (m, d) from positions and time."""
 
     def set_inflow(self, velocity: NDArray[np.float64]) -> None:
         """Prescribe the velocity of the inlet buffer particles, (d,) or (m, d) in the order of `inflow_position`."""

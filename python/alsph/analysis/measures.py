@@ -2,7 +2,10 @@
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
 
 from alsph.arrays import FloatArray
 
@@ -30,6 +33,10 @@ class Measure:
     reference: float = math.nan
     tolerance: float = math.nan
     source: str = ""
+
+    def alone(self) -> Self | None:
+        """Return it without its reference, None if it is an error norm."""
+        return None if self.reference == 0 else replace(self, reference=math.nan, tolerance=math.nan, source="")
 
     @property
     def error(self) -> float:
@@ -63,6 +70,10 @@ class Profile:
     computed: tuple[FloatArray, FloatArray]
     reference: tuple[FloatArray, FloatArray]
     source: str
+
+    def alone(self) -> Self:
+        """Return it without its reference."""
+        return replace(self, reference=(np.empty(0), np.empty(0)), source="")
 
     @property
     def file_name(self) -> str:

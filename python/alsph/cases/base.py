@@ -7,12 +7,13 @@ import math
 import re
 import warnings
 from abc import abstractmethod
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
@@ -20,12 +21,15 @@ from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.method import Method
 from alsph.engine.output import Output
+from alsph.engine.prescribed import Rule, inlets
 from alsph.engine.problem import Problem
 from alsph.engine.simulation import Simulation, bytes_per_particle, time_step_limits
 from alsph.errors import ConfigError
+from alsph.expressions import VectorExpression
 from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
 from alsph.memory import check
+from alsph.text import shown
 
 if TYPE_CHECKING:
     from alsph.results.run import Run
@@ -33,6 +37,9 @@ if TYPE_CHECKING:
 VELOCITY_LIMIT = 50.0
 """Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
 
+
+RULES = {"inflow": "inlet_velocity", "forcing": "driving_force", "sliding": "surface_velocity"}
+"""What a case may prescribe by place and time: a method in Python, and the parameter that holds an expression."""
 
 WORD = re.compile(r"(?<=[a-z0-9])(?=[A-Z][a-z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[a-z])(?=[A-Z])")
 """Where a new word begins in the name of a class."""
@@ -71,6 +78,29 @@ class Case(Method):
 
     reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, ge=8, description="particles per reference length, D/Δx [-]")
+    inlet_velocity: str | None = Field(
+        default=None,
+        description="velocity at the inlets by place and time, as '1 + 0.2*sin(2*pi*t/5), 0'; none: uniform, U [U]",
+    )
+    driving_force: str | None = Field(
+        default=None, description="a further body force per unit mass by place and time, as '0.1*sin(t), 0' [U²/D]"
+    )
+    surface_velocity: str | None = Field(
+        default=None,
+        description="velocity of the surfaces of bodies in place, by place and time, as '-2*y, 2*(x - 4)' [U]",
+    )
+
+    @model_validator(mode="after")
+    def _expressions_are_vectors(self) -> Self:
+        for name in self._expressions:
+            method = next(method for method, parameter in RULES.items() if parameter == name)
+            if self._overrides(method):
+                raise ConfigError(f"{name}: {type(self).__name__} says that itself, by its method `{method}`")
+        if self.inlet_velocity is not None and not any(inlets(self.domain())):
+            raise ConfigError(f"inlet_velocity = {shown(self.inlet_velocity)}: {self.name} has no inlet")
+        if self.surface_velocity is not None and all(body["moves"] for body in self.bodies()):
+            raise ConfigError(f"surface_velocity = {shown(self.surface_velocity)}: {self.name} has no body in place")
+        return self
 
     @classmethod
     def parameter_names(cls) -> list[str]:
@@ -147,8 +177,8 @@ class Case(Method):
     def inflow(self, position: FloatArray, time: float) -> ArrayLike | None:
         """Return the velocity of the inlet particles, which is asked for before every step.
 
-        A case without this method, such as all that come with alsph, gives them their velocities in :meth:`particles`:
-        they keep them and hand them on to those that follow.
+        A case without this method gives them their velocities in :meth:`particles`: they keep them and hand them on to
+        those that follow, unless ``inlet_velocity`` is given.
 
         Parameters
         ----------
@@ -162,12 +192,85 @@ class Case(Method):
         array or None
             Velocities (m, d), or one (d,), by position and time alone [U]; None: those that they have.
         """
-        return None
+        return self._given("inlet_velocity", position, time)
+
+    def forcing(self, position: FloatArray, time: float) -> ArrayLike | None:
+        """Return a body force per unit mass beside :meth:`body_force`, which is asked for in every step.
+
+        By default it is ``driving_force``, if that is given. The time step does not follow it.
+
+        Parameters
+        ----------
+        position
+            Any positions (n, d) [D].
+        time
+            Any time [D/U].
+
+        Returns
+        -------
+        array
+            Forces (n, d), or one (d,), by position and time alone [U²/D].
+        """
+        return self._given("driving_force", position, time)
+
+    def sliding(self, position: FloatArray, time: float) -> ArrayLike | None:
+        """Return the velocity of the surfaces of bodies that stay in place, which is asked for in every step.
+
+        By default it is ``surface_velocity``, if that is given. It takes the place of the ``velocity`` of those of
+        :meth:`bodies` that do not move.
+
+        Parameters
+        ----------
+        position
+            Any positions (m, d) [D].
+        time
+            Any time [D/U].
+
+        Returns
+        -------
+        array
+            Velocities (m, d), or one (d,), by position and time alone [U].
+        """
+        return self._given("surface_velocity", position, time)
+
+    def _given(self, name: str, position: FloatArray, time: float) -> FloatArray | None:
+        expression = self._expressions.get(name)
+        return expression(position, time) if expression else None
+
+    @cached_property
+    def _expressions(self) -> dict[str, VectorExpression]:
+        """The vectors that are given as expressions, by parameter."""
+        numbers = {
+            name: float(value)
+            for name in type(self).model_fields.keys() - Method.model_fields.keys()
+            if isinstance(value := getattr(self, name), int | float) and not isinstance(value, bool)
+        }
+        found = {}
+        for name in RULES.values():
+            if (text := getattr(self, name)) is not None:
+                try:
+                    found[name] = VectorExpression(text, self.space_dimensions, numbers)
+                except ValueError as error:
+                    raise ConfigError(f"{name} = {shown(text)}: {error}") from None
+        return found
 
     @property
-    def has_inflow(self) -> bool:
-        """Whether the case has a rule of its own for the inflow."""
-        return type(self).inflow is not Case.inflow
+    def rules(self) -> dict[str, Rule]:
+        """What the case prescribes by functions of place and time: ``inflow``, ``forcing``, ``sliding``."""
+        return {
+            name: getattr(self, name)
+            for name, parameter in RULES.items()
+            if self._overrides(name) or getattr(self, parameter) is not None
+        }
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether an expression makes the flow another one than the references are of."""
+        return bool(self._expressions)
+
+    @classmethod
+    def _overrides(cls, name: str) -> bool:
+        return getattr(cls, name) is not getattr(Case, name)
 
     def surface_points(self) -> Surface | None:
         """Return where the surface pressure is sampled."""
@@ -227,6 +330,7 @@ class Case(Method):
             *remarks.kernel(self.kernel, self.smoothing_ratio),
             *remarks.scheme(self.scheme, self.wall_pressure),
             *remarks.derived(type(self)),
+            *remarks.prescribed(list(self._expressions)),
             *remarks.penalty(self.expected_penalty_constant()),
         ]
 
@@ -254,7 +358,10 @@ class Case(Method):
             "body_force": self.body_force(),
             "time_step": self.largest_time_step * self.particle_spacing,
             "domain": self.domain(),
-            "bodies": self.bodies(),
+            "bodies": [
+                body | ({"velocity": None} if "sliding" in self.rules and not body["moves"] else {})
+                for body in self.bodies()
+            ],
         }
 
     def build(self, threads: int | None = None) -> Problem:
@@ -333,8 +440,10 @@ class Case(Method):
 
     def _simulation(self, problem: Problem, threads: int | None) -> Simulation:
         simulation = Simulation(problem, threads, until=self.default_until)
-        if self.has_inflow:
-            simulation.set_inflow(self.inflow)
+        rules = dict(self.rules)
+        if "inflow" in rules:
+            simulation.set_inflow(rules.pop("inflow"))
+        simulation.prescribe(**rules)
         return simulation
 
     def run(

@@ -28,8 +28,8 @@ class Bodies(Channel):
     """Flow past bodies of any shape in a channel with free-slip walls and uniform inflow U.
 
     The solid particles follow the surfaces. What is thinner than 2 Δx, such as a sharp trailing edge, is cut off
-    (:attr:`carried`); a body of which that leaves less than half is refused. Forces are formed with D, and are those of all
-    bodies together as well as of each.
+    (:attr:`carried`); a body of which that leaves less than half is refused. Forces are formed with D, and are those
+    of all bodies together as well as of each.
     """
 
     body_name: ClassVar[str] = "body"

@@ -26,8 +26,8 @@ class Body(Bodies):
     D is the side of the square, the chord of the airfoil, or the unit of the file's lengths. A file holds points, two
     numbers a line, in any of the usual orders and forms; several closed curves are several bodies. The centroid, that
     of all of them together, lies at (upstream, 0). The solid particles follow the surface. What is thinner than 2 Δx,
-    such as a sharp trailing edge, is cut off (:attr:`carried`); a body of which that leaves less than half is refused. Forces
-    are formed with D; moments with the chord c, the body's extent along x before it is turned, about the point at c/4.
+    such as a sharp trailing edge, is cut off (:attr:`carried`); a body of which that leaves less than half is refused.
+    Forces are formed with D; moments with the chord c, the body's extent along x before it is turned, about c/4.
     """
 
     name: ClassVar[str] = "body"

@@ -254,6 +254,13 @@ def derived(model: type) -> list[str]:
     return [f"not validated: {text}; if its flow is another one it needs its own measures, profiles and validated"]
 
 
+def prescribed(names: list[str]) -> list[str]:
+    """Remark on what a case prescribes by expressions, with which its references have nothing to do."""
+    if not names:
+        return []
+    return [f"not validated: {', '.join(names)} of its own; references are of the flow without and not used"]
+
+
 def gaps(names: list[str], bodies: list[Polygon | MultiPolygon], spacing: float) -> list[str]:
     """Remark on bodies so near each other that the flow between them is not resolved (lengths in D)."""
     found = []

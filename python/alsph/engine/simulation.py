@@ -7,7 +7,7 @@ import os
 import threading
 import time as clock
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import alsph._alsph as _alsph
 from alsph.arrays import FloatArray
-from alsph.engine.inflow import Inflow, Prescription, backflow
+from alsph.engine.prescribed import Prescription, Rule, asked, backflow
 from alsph.engine.problem import Problem
 from alsph.errors import ConfigError, SharedError, SolverError
 from alsph.geometry.particles import Kind
@@ -141,10 +141,10 @@ class Simulation:
 
     Attributes
     ----------
-    inflow : function, optional
-        The rule that :meth:`set_inflow` was given.
-    prescribed : Prescription, optional
-        What it gave before the last step.
+    rules : dict of function
+        Those that :meth:`set_inflow` and :meth:`prescribe` were given: ``inflow``, ``forcing``, ``sliding``.
+    prescribed : dict of Prescription
+        What they gave for the last step.
     backflow : str
         The warning of fluid that leaves through an inlet; empty without.
     """
@@ -152,8 +152,8 @@ class Simulation:
     def __init__(self, problem: Problem, threads: int | None = None, until: float = math.inf) -> None:
         self.problem = problem
         self.until = until
-        self.inflow: Inflow | None = None
-        self.prescribed: Prescription | None = None
+        self.rules: dict[str, Rule] = {}
+        self.prescribed: dict[str, Prescription] = {}
         self.backflow = ""
         self._history: list[dict[str, NDArray[Any]]] = []
         self._start(problem.state, threads)
@@ -349,7 +349,7 @@ class Simulation:
         with self._engine() as engine:
             return engine.inflow_position()
 
-    def set_inflow(self, velocity: ArrayLike | Inflow) -> None:
+    def set_inflow(self, velocity: ArrayLike | Rule) -> None:
         """Prescribe the velocity of the inlet particles.
 
         Parameters
@@ -364,21 +364,62 @@ class Simulation:
         ConfigError
             If it is no such array, or more fluid would leave through an inlet than enter.
         """
-        self.inflow, self.prescribed = (velocity if callable(velocity) else None), None
+        for told in (self.rules, self.prescribed):
+            told.pop("inflow", None)
         if callable(velocity):
-            nothing = self.inflow_position()[:0]
-            self.prescribed = Prescription(self.time, nothing, nothing)
+            self._tell("inflow", velocity)
         else:
             self._apply(velocity, self.inflow_position())
 
+    def prescribe(self, forcing: Rule | None = None, sliding: Rule | None = None) -> None:
+        """Prescribe a body force, and the velocity of surfaces, by functions that are called once a step.
+
+        Parameters
+        ----------
+        forcing
+            Body force per unit mass beside that of the settings [U²/D]; none if None. A function of positions (m, d)
+            [D], those of the particles in the middle of the step, and the time there [D/U], which gives an array
+            (m, d), or (d,) for a force that is the same everywhere. The time step does not follow it: give a smaller
+            ``time_step`` where it is much larger than U²/D.
+        sliding
+            Likewise the velocity of the solid particles of bodies whose ``velocity`` is None [U], which stay where
+            they are, as those of a cylinder that rotates; that of the state if None.
+
+        The rules of a case are better its :meth:`alsph.cases.Case.forcing` and :meth:`alsph.cases.Case.sliding`. They
+        are called in a thread of the engine, and cannot use the simulation.
+        """
+        for name, rule in (("forcing", forcing), ("sliding", sliding)):
+            for told in (self.rules, self.prescribed):
+                told.pop(name, None)
+            if rule is not None:
+                self._tell(name, rule)
+        self._hand_over()
+
+    def _tell(self, name: str, rule: Rule) -> None:
+        self.rules[name] = rule
+        self.prescribed[name] = Prescription.nothing_yet(self.time, int(self.problem.settings["dimensions"]))
+
+    def _hand_over(self) -> None:
+        """Give the engine the rules that it asks itself."""
+        with self._engine() as engine:
+            engine.prescribe(*(self._answer(name) if name in self.rules else None for name in ("forcing", "sliding")))
+
+    def _answer(self, name: str) -> Callable[[FloatArray, float], FloatArray]:
+        def answer(position: FloatArray, time: float) -> FloatArray:
+            values = np.ascontiguousarray(asked(name, self.rules[name], position, time))
+            self.prescribed[name] = Prescription.of(time, position, values)
+            return values
+
+        return answer
+
     def _prescribe(self, steps: int) -> int:
         """Apply an inflow given as a function; return how many of `steps` may be taken until it is due again."""
-        if self.inflow is None:
+        if "inflow" not in self.rules:
             return steps
         position = self.inflow_position()
-        velocity = self.inflow(position.copy(), self.time)
+        velocity = self.rules["inflow"](position.copy(), self.time)
         if velocity is not None:
-            self.prescribed = Prescription(self.time, position, self._apply(velocity, position))
+            self.prescribed["inflow"] = Prescription.of(self.time, position, self._apply(velocity, position))
         return 1
 
     def _apply(self, velocity: ArrayLike, position: FloatArray) -> FloatArray:
@@ -398,7 +439,7 @@ class Simulation:
             warnings.warn(warning, RuntimeWarning, stacklevel=4)
 
     def state(self) -> dict[str, Any]:
-        """Return all that :meth:`restore` needs to go on from here to the last bit (an inflow function excepted)."""
+        """Return all that :meth:`restore` needs to go on from here to the last bit, but for the rules."""
         with self._engine() as engine:
             return engine.state()
 
@@ -406,8 +447,9 @@ class Simulation:
         """Go back to a state that :meth:`state` has returned; the history starts anew."""
         self._start(state, self.threads)
         self._history = []
-        if self.inflow is not None:
-            self.set_inflow(self.inflow)
+        if "inflow" in self.rules:
+            self.set_inflow(self.rules["inflow"])
+        self.prescribe(self.rules.get("forcing"), self.rules.get("sliding"))
 
 
 def next_multiple(time: float, interval: float) -> float:

@@ -2,21 +2,22 @@
 
 The first 512 bytes, which HDF5 leaves to its user, hold the format's name and version and the SHA-256 of all that
 follows, so that a damaged file is refused before the HDF5 library sees it. Behind them are the arrays of
-:meth:`alsph.Simulation.state`, its numbers as attributes, the case as the bytes of a JSON text and, where the inflow is
-prescribed by a rule, what it gave last. Version 1 had neither head nor case.
+:meth:`alsph.Simulation.state`, its numbers as attributes, the case as the bytes of a JSON text and, where rules
+prescribe something, what they gave last. Version 1 had neither head nor case.
 """
 
 import hashlib
 import io
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
 
-from alsph.engine.inflow import Prescription
+from alsph.engine.prescribed import WORDS, Prescription
 from alsph.engine.simulation import TYPES
 from alsph.errors import DamagedError, RunFolderError
 from alsph.folder.durable import replacing
@@ -27,7 +28,7 @@ HEAD_BYTES = 512
 NAME = b"alsph checkpoint"
 HDF5 = b"\x89HDF\r\n\x1a\n"
 CASE = "case"
-INFLOW = {"time": "inflow_time", "position": "inflow_position", "velocity": "inflow_velocity"}
+PRESCRIBED = {"time": "time", "position": "position", "values": "velocity"}
 READ_BYTES = 2**20
 
 
@@ -43,14 +44,14 @@ class Checkpoint:
         The tables of the case that the run was made with; None in a checkpoint of version 1.
     warning : str
         Why it is not the newest one.
-    inflow : Prescription, optional
-        What the rule for the inflow gave last; None without a rule, and in a checkpoint of an older alsph.
+    prescribed : dict of Prescription
+        What each of the rules gave last, by its name; in a checkpoint of an older alsph perhaps not.
     """
 
     state: dict[str, Any]
     case: dict[str, Any] | None
     warning: str = ""
-    inflow: Prescription | None = None
+    prescribed: Mapping[str, Prescription] = field(default_factory=dict)
 
 
 def write(
@@ -58,7 +59,7 @@ def write(
     previous: Path | None,
     state: dict[str, Any],
     case: dict[str, Any],
-    inflow: Prescription | None = None,
+    prescribed: Mapping[str, Prescription] | None = None,
 ) -> None:
     """Write a checkpoint; the one that was there becomes `previous`."""
     content = io.BytesIO()  # the HDF5 library does not bear a disk that fails
@@ -69,8 +70,9 @@ def write(
                 file.create_dataset(name, data=value, compression="gzip", compression_opts=1, shuffle=True)
             else:
                 file.attrs[name] = value
-        for name, key in INFLOW.items() if inflow else ():
-            file[key] = np.atleast_1d(getattr(inflow, name))
+        for rule, given in (prescribed or {}).items():
+            for name, key in PRESCRIBED.items():
+                file[f"{rule}_{key}"] = np.atleast_1d(getattr(given, name))
     head = b"%s\nversion %d\nsha256 %s\n" % (NAME, VERSION, _hash(content).encode())
     content.seek(0)
     content.write(head.ljust(HEAD_BYTES, b"\0"))
@@ -100,12 +102,12 @@ def read(path: Path) -> Checkpoint:
             state = {name: _number(file, name) for name in file.attrs}
             state |= {name: rows(sound(file, name)) for name in TYPES if name in file}
             case = json.loads(rows(sound(file, CASE)).tobytes()) if CASE in file else None
-            inflow = _inflow(file)
+            prescribed = {rule: _prescription(file, rule) for rule in WORDS if f"{rule}_time" in file}
         if not isinstance(case, dict | None):
             raise ValueError("its case is no table")
         if not state.keys() >= {"time", "step", "position"}:
             raise ValueError("it has no time, step or position")
-        return Checkpoint(state, case, inflow=inflow)
+        return Checkpoint(state, case, prescribed=prescribed)
     except DAMAGE as error:
         raise DamagedError(f"{path}: not a checkpoint, or damaged: {error}") from None
 
@@ -130,14 +132,13 @@ def _number(file: h5py.File, name: str) -> Any:
     return file.attrs[name].item()
 
 
-def _inflow(file: h5py.File) -> Prescription | None:
-    """Return what the rule for the inflow gave last, if there was one."""
-    if INFLOW["time"] not in file:
-        return None
-    time, position, velocity = (np.asarray(sound(file, key)[()], float) for key in INFLOW.values())
-    if time.shape != (1,) or position.ndim != 2 or position.shape != velocity.shape:
-        raise ValueError("its inflow is incomplete")
-    return Prescription(float(time[0]), position, velocity)
+def _prescription(file: h5py.File, rule: str) -> Prescription:
+    """Return what a rule gave last."""
+    found = (np.asarray(sound(file, f"{rule}_{key}")[()], float) for key in PRESCRIBED.values())
+    time, position, values = found
+    if time.shape != (1,) or position.ndim != 2 or position.shape != values.shape:
+        raise ValueError(f"its {rule} is incomplete")
+    return Prescription(float(time[0]), position, values)
 
 
 def _check_head(path: Path) -> None:

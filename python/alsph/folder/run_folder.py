@@ -13,7 +13,7 @@ import re
 import shutil
 import time as clock
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -24,8 +24,8 @@ import filelock
 from numpy.typing import NDArray
 
 from alsph.arrays import AXES, size_of
-from alsph.engine.inflow import Prescription
 from alsph.engine.output import Output
+from alsph.engine.prescribed import Prescription
 from alsph.errors import DamagedError, RunFolderError
 from alsph.folder import checkpoint, reading, vtkhdf
 from alsph.folder.checkpoint import Checkpoint
@@ -278,13 +278,15 @@ class RunFolder:
         """Return the particles that the run began with, None if they are those of its case."""
         return checkpoint.read(self._file(START)).state if self._file(START).exists() else None
 
-    def write_checkpoint(self, state: dict[str, Any], case: dict[str, Any], inflow: Prescription | None = None) -> None:
+    def write_checkpoint(
+        self, state: dict[str, Any], case: dict[str, Any], prescribed: Mapping[str, Prescription] | None = None
+    ) -> None:
         """Write ``checkpoint.h5``; the one before is kept. The history up to it is made safe first."""
         self._make_room(size_of(state))
         with self._writing():
             if self._file("history.csv").exists():
                 flush(self._file("history.csv"))
-            checkpoint.write(self._file(CHECKPOINTS[0]), self._file(CHECKPOINTS[1]), state, case, inflow)
+            checkpoint.write(self._file(CHECKPOINTS[0]), self._file(CHECKPOINTS[1]), state, case, prescribed)
 
     def has_checkpoint(self) -> bool:
         """Whether there is a checkpoint, be it damaged."""

@@ -11,6 +11,7 @@ from alsph.analysis import sampling
 from alsph.analysis.record import Record
 from alsph.arrays import AXES, FloatArray
 from alsph.cases.base import Case
+from alsph.engine.prescribed import asked
 from alsph.geometry.particles import Snapshot
 
 
@@ -105,8 +106,10 @@ def _open(case: Case) -> bool:
 
 
 def _wall_power(run: Record, case: Case) -> FloatArray:
-    """Work of the moving bodies on the fluid in unit time (n,): minus the force on each times its velocity."""
+    """Work of the moving bodies on the fluid in unit time (n,): minus the force on each times its velocity; or NaN."""
     power = np.zeros_like(run.history["time"])
+    if "sliding" in case.rules:  # which the force on the whole body does not tell
+        return np.full_like(power, np.nan)
     for body in case.bodies():
         for axis, speed in zip(AXES, body["velocity"], strict=False):
             for part in ("pressure", "viscous"):
@@ -120,7 +123,10 @@ def _budget(snapshot: Snapshot, case: Case) -> tuple[float, float]:
     position, velocity, volume = snapshot.position[fluid], snapshot.velocity[fluid], spacing**case.space_dimensions
     gradient = sampling.interpolate(*_with_images(position, velocity, case), position, spacing)[1]
     strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
-    power = (velocity @ np.array(case.body_force())).sum()
+    force = np.array(case.body_force())
+    if "forcing" in case.rules:
+        force = force + asked("forcing", case.rules["forcing"], position, snapshot.time)
+    power = (velocity * force).sum()
     return 2 * case.kinematic_viscosity * volume * float((strain**2).sum()), volume * float(power)
 
 

@@ -98,12 +98,13 @@ class Run(Fields):
                 raise
             what = reason(error, case.code.file if case.code else "<cell>")
             return [], [f"no measures: those of {type(case).__name__} fail, {what}; correct the file that defines it"]
-        return found, []
+        return [alone for measure in found if (alone := measure.alone())] if case.is_driven else found, []
 
     @cached_property
     def profiles(self) -> list[Profile]:
         """Curves of the run beside their reference curves."""
-        return self.config.case.profiles(self)
+        found = self.config.case.profiles(self)
+        return [profile.alone() for profile in found] if self.config.case.is_driven else found
 
     @cached_property
     def ledger(self) -> Ledger:

@@ -15,7 +15,7 @@ from alsph.analysis import sampling
 from alsph.cases.base import Case
 from alsph.cases.source import shown_name
 from alsph.config import Config
-from alsph.engine.inflow import difference
+from alsph.engine.prescribed import WORDS, difference
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder.checkpoint import Checkpoint
@@ -116,10 +116,10 @@ def _same_path(one: str | None, two: str | None) -> bool:
 
 
 def alike(config: Config, kept: Config, folder: RunFolder, info: dict[str, Any]) -> bool:
-    """Whether a run, of which `kept` and `info` tell, has the class, beginning and inflow of this configuration."""
+    """Whether a run, of which `kept` and `info` tell, has the class, beginning and rules of this configuration."""
     if info.get("case_class", type(config.case).__qualname__) != type(config.case).__qualname__:
         return False
-    return _same_flow(config, kept, info) and _same_inflow(config, folder, info)
+    return _same_flow(config, kept, info) and _same_rules(config, folder, info)
 
 
 def _same_flow(config: Config, kept: Config, info: dict[str, Any]) -> bool:
@@ -132,13 +132,13 @@ def _same_flow(config: Config, kept: Config, info: dict[str, Any]) -> bool:
         return _same_path(initial, kept.run.initial_run)
 
 
-def _same_inflow(config: Config, folder: RunFolder, info: dict[str, Any]) -> bool:
-    """Whether a run's inflow, where it is prescribed by a function, is still that of the case."""
-    if not (config.case.has_inflow or info.get("inflow_function")):
+def _same_rules(config: Config, folder: RunFolder, info: dict[str, Any]) -> bool:
+    """Whether what functions prescribe in a run is still what the case's do."""
+    if not (config.case.rules or rules_of(info)):
         return True
     try:
         saved = folder.read_checkpoint()
-        return not difference(restored(config, saved, folder).inflow, saved.inflow)
+        return not difference(restored(config, saved, folder).rules, saved.prescribed)
     except RunFolderError:
         return False
 
@@ -178,15 +178,21 @@ def restored(config: Config, saved: Checkpoint, folder: RunFolder) -> Simulation
     Raises
     ------
     RunFolderError
-        If the checkpoint does not fit, or a function prescribed the inflow and the case does not tell of any.
+        If the checkpoint does not fit, or a function prescribed something and the case does not tell of any.
     """
     try:
         simulation = config.case.restored(saved.state, config.run.threads)
     except ConfigError as error:
         raise RunFolderError(f"{folder.path}: its checkpoint does not fit its case: {error}") from None
-    if saved.inflow and not simulation.inflow:
-        raise RunFolderError(
-            f"{folder.path}: a function prescribes the inflow of the run, and its case does not tell of any; make it "
-            "the method `inflow` of the case's class, and put that into alsph.cases.CASES before"
-        )
+    for name in saved.prescribed:
+        if name not in simulation.rules:
+            raise RunFolderError(
+                f"{folder.path}: a function prescribes the {WORDS[name]} of the run, and its case does not tell of "
+                f"any; make it the method `{name}` of the case's class, and put that into alsph.cases.CASES before"
+            )
     return simulation
+
+
+def rules_of(info: dict[str, Any]) -> list[str]:
+    """Return the names of the rules that ``run.json`` tells of."""
+    return list(info.get("rules", ["inflow"] if info.get("inflow_function") else []))

@@ -213,7 +213,7 @@ class Driver:
             "peak_memory_bytes": peak_memory(),
             "pid": os.getpid(),
             "case_class": type(self.config.case).__qualname__,
-            "inflow_function": self.simulation.inflow is not None,
+            "rules": sorted(self.simulation.rules),
             "began": self.began,
             "outputs": [output.file for output in self.outputs],
             "segments": self.segments,

@@ -7,7 +7,7 @@ from typing import Any
 
 from alsph import config
 from alsph.config import Config
-from alsph.engine.inflow import difference
+from alsph.engine.prescribed import WORDS, difference
 from alsph.engine.simulation import SLICE_SECONDS, Simulation
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.folder import checkpoint
@@ -117,7 +117,7 @@ def _environment(simulation: Simulation, folder: RunFolder, then: dict[str, Any]
     now, facts = provenance(simulation.threads), ("versions", "commit", "instructions", "threads")
     found = [f"{name}: {now[name]}, was {then.get(name)}" for name in facts if now[name] != then.get(name)]
     with contextlib.suppress(DamagedError):  # of which a repetition needs nothing else
-        if change := difference(simulation.inflow, folder.read_checkpoint().inflow):
+        if change := difference(simulation.rules, folder.read_checkpoint().prescribed):
             found.append(change)
     return found
 
@@ -134,11 +134,12 @@ def _begun(first: Config, threads: int | None, folder: RunFolder, info: dict[str
     if state is None and initial is not None:
         raise RunFolderError(f"{cannot} it began with the flow of another run, '{initial}', and has no {START}")
     simulation = first.case.restored(state, threads) if state else first.case.simulation(threads)
-    if info.get("inflow_function") and not simulation.inflow:
-        raise RunFolderError(
-            f"{cannot} a function prescribes its inflow, and its case does not tell of any; make it the method "
-            "`inflow` of the case's class"
-        )
+    for name in beginning.rules_of(info):
+        if name not in simulation.rules:
+            raise RunFolderError(
+                f"{cannot} a function prescribes its {WORDS[name]}, and its case does not tell of any; make it the "
+                f"method `{name}` of the case's class"
+            )
     return simulation
 
 

@@ -9,7 +9,7 @@ from alsph import config
 from alsph.arrays import size_of
 from alsph.cases.base import Case
 from alsph.config import Config, RunSettings, of_run
-from alsph.engine.inflow import difference
+from alsph.engine.prescribed import difference
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.folder.checkpoint import Checkpoint
 from alsph.folder.run_folder import RunFolder
@@ -139,7 +139,7 @@ def _resume(folder: RunFolder, until: float | None, threads: int | None, control
             remarks.append(f"goes on with other settings than before: {', '.join(changed)}")
         config.case.check_memory(config.run.threads)
         simulation = beginning.restored(config, saved, folder)
-        if change := difference(simulation.inflow, saved.inflow):
+        if change := difference(simulation.rules, saved.prescribed):
             remarks.append(f"goes on with {change}")
         remarks += beginning.changed(config, info)
         if saved.warning:

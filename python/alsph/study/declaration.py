@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from alsph import config
 from alsph.config import Config
-from alsph.engine.inflow import fingerprint
+from alsph.engine.prescribed import fingerprint
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters, suggest
 from alsph.plotting.pictures import field_style
@@ -223,8 +223,8 @@ def digest(configuration: Config, *without: str) -> str:
     case, initial = configuration.case, configuration.run.initial_run
     if initial is not None:
         tables["run"]["initial_run"] = beginning.flow_sha256(Run(initial))
-    if case.has_inflow:
-        tables["inflow"] = fingerprint(case.inflow, case.domain(), configuration.until)
+    for name, rule in case.rules.items():
+        tables[name] = fingerprint(name, rule, case.domain(), configuration.until)
     return hashlib.sha256(json.dumps(tables, sort_keys=True).encode()).hexdigest()
 
 

@@ -1,0 +1,173 @@
+"""What is prescribed by rules of place and time, by what they gave last they are known again, and what inlets let in.
+
+The rules, by name: ``inflow``, the velocity of the inlet particles [U]; ``forcing``, a body force per unit mass beside
+the constant one [U²/D]; ``sliding``, the velocity of the surfaces of bodies that stay in place [U].
+"""
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from alsph.arrays import FloatArray
+from alsph.errors import ConfigError
+from alsph.geometry.lattice import lattice
+
+Rule = Callable[[FloatArray, float], ArrayLike | None]
+"""Vectors (m, d), or one (d,), from positions (m, d) [D] and the time [D/U].
+
+None, of an inflow, leaves the inlet particles the velocities that they have.
+"""
+
+WORDS = {"inflow": "inflow", "forcing": "body force", "sliding": "velocity of surfaces"}
+"""What the rules prescribe."""
+
+KEPT = 256
+"""Of how many positions it is kept what a rule gave."""
+
+ROUND_OFF = 1e-9
+"""Share of the largest speed below which a velocity out of the domain is none."""
+
+SAMPLES = 16
+"""Times, and points along each direction of an inlet, at which rules are told apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prescription:
+    """What a rule gave before the last step, by which it is known again; without particles before the first one.
+
+    Attributes
+    ----------
+    time : float
+        tU/D.
+    position, values : ndarray, shape (m, d)
+        Where, and what.
+    """
+
+    time: float
+    position: FloatArray
+    values: FloatArray
+
+    @classmethod
+    def nothing_yet(cls, time: float, dimensions: int) -> Self:
+        """Return that of a rule that has not been asked."""
+        return cls(time, np.empty((0, dimensions)), np.empty((0, dimensions)))
+
+    @classmethod
+    def of(cls, time: float, position: FloatArray, values: FloatArray) -> Self:
+        """Return what is kept of what a rule gave."""
+        some = slice(None, None, max(1, -(-len(position) // KEPT)))
+        return cls(time, position[some], values[some])
+
+
+def asked(name: str, rule: Rule, position: FloatArray, time: float) -> FloatArray | None:
+    """Return the vectors (m, d) that a rule gives, None if it gives none.
+
+    Raises
+    ------
+    ConfigError
+        If they are none.
+    """
+    values = rule(position.copy(), time)
+    if values is None and name == "inflow":
+        return None
+    try:
+        vectors = np.asarray(() if values is None else values, float)
+    except (TypeError, ValueError):
+        vectors = np.empty(0)
+    if vectors.shape not in (position.shape, position.shape[1:]):
+        raise ConfigError(f"{name}: the function must give {position.shape[1]} numbers a position, or as many")
+    return np.broadcast_to(vectors, position.shape)
+
+
+def difference(rules: Mapping[str, Rule], then: Mapping[str, Prescription]) -> str:
+    """Say how rules differ from those that gave `then`, in words; return nothing if they do not."""
+    return "; ".join(filter(None, (_difference(name, rules.get(name), then.get(name)) for name in WORDS)))
+
+
+def _difference(name: str, rule: Rule | None, then: Prescription | None) -> str:
+    what = WORDS[name]
+    if rule is None:
+        return f"no function for the {what}" if then else ""
+    if then is None:
+        return f"a function for the {what}, of which the run did not tell before"
+    if not len(then.position):
+        return ""
+    now = asked(name, rule, then.position, then.time)
+    if now is None:
+        return f"a function for the {what} that gives no velocities"
+    change = float(np.abs(now - then.values).max())
+    if change <= 1e-12 * max(1.0, float(np.abs(then.values).max())):  # another mathematical library's rounding
+        return ""
+    return f"another {what}: at t* = {then.time:.6g} its values differ by up to {change:.3g}"
+
+
+def fingerprint(name: str, rule: Rule, domain: dict[str, Any], until: float) -> str:
+    """Return a hash of what a rule gives at points of the domain, or its inlets, and times up to `until` [D/U]."""
+    total = hashlib.sha256()
+    shares = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    lower, upper = np.array(domain["lower"], float), np.array(domain["upper"], float)
+    axes = list(lower[:, None] + np.outer(upper - lower, shares))
+    grids = [axes]
+    if name == "inflow":
+        grids = [
+            [np.array([plane]) if k == axis else values for k, values in enumerate(axes)]
+            for axis, _, plane in inlets(domain)
+        ]
+    for grid in grids:
+        for share in (np.arange(SAMPLES) * 0.618034) % 1:  # no multiples of a period
+            values = asked(name, rule, lattice(*grid), float(share * until))
+            # In single precision, which no rounding of another mathematical library reaches.
+            total.update(b"" if values is None else np.ascontiguousarray(values, np.float32).tobytes())
+    return total.hexdigest()
+
+
+def backflow(domain: dict[str, Any], position: FloatArray, velocity: FloatArray, time: float) -> str:
+    """Return a warning if velocities prescribed at an inlet point out of the domain in places.
+
+    Parameters
+    ----------
+    domain
+        ``lower``, ``upper`` and ``boundaries`` of the domain.
+    position, velocity : ndarray, shape (m, d)
+        Of the inlet particles [D], [U].
+    time
+        tU/D.
+
+    Raises
+    ------
+    ConfigError
+        If they do so on the whole: more fluid would leave through the inlet than enter.
+    """
+    sides = list(inlets(domain))
+    if not sides or not len(position):
+        return ""
+    depth = np.stack([sign * (position[:, axis] - plane) for axis, sign, plane in sides])
+    nearest, out = depth.argmin(axis=0), -ROUND_OFF * np.abs(velocity).max()
+    warning = ""
+    for index, (axis, sign, plane) in enumerate(sides):
+        inward = sign * velocity[nearest == index, axis]
+        where = f"through the inlet {'xyz'[axis]} = {plane:g} at t* = {time:.4g}"
+        if len(inward) and inward.mean() < out:
+            raise ConfigError(
+                f"inflow: backflow, the mean velocity {where} is {-inward.mean():.3g} U out of the domain; an inlet "
+                "takes fluid in: turn the velocity round, or make this side an outlet"
+            )
+        if (inward < out).any():
+            warning = warning or (
+                f"inflow: backflow {where}: {np.count_nonzero(inward < out)} of {len(inward)} particles have a "
+                f"velocity out of the domain, up to {-inward.min():.3g} U; an inlet takes fluid in: expect errors "
+                "near it, and a breakdown if this lasts"
+            )
+    return warning
+
+
+def inlets(domain: dict[str, Any]) -> Iterator[tuple[int, int, float]]:
+    """Yield axis, sign of the inward normal and plane of each side of a domain that is an inlet."""
+    for axis, sides in enumerate(domain["boundaries"]):
+        for side, sign, plane in zip(sides, (1, -1), (domain["lower"][axis], domain["upper"][axis]), strict=True):
+            if side == "inlet":
+                yield axis, sign, float(plane)

@@ -1,0 +1,122 @@
+"""Vectors written as expressions of place and time, such as ``"1 + 0.2*sin(2*pi*t), 0"``."""
+
+import ast
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from alsph.arrays import FloatArray
+from alsph.text import shown
+
+FUNCTIONS = {
+    name: getattr(np, name)
+    for name in (
+        *("sin", "cos", "tan", "arcsin", "arccos", "arctan", "arctan2", "hypot", "sinh", "cosh", "tanh"),
+        *("exp", "log", "sqrt", "abs", "sign", "floor", "minimum", "maximum", "where"),
+    )
+}
+"""What an expression may call: functions of numpy, element by element."""
+
+CONSTANTS = {"pi": np.pi, "e": np.e}
+
+LONGEST = 2000
+"""Characters."""
+
+ALLOWED = (
+    *(ast.Expression, ast.BinOp, ast.UnaryOp, ast.Compare, ast.Call, ast.Name, ast.Load, ast.Constant),
+    *(ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.Mod, ast.USub, ast.UAdd, ast.Lt, ast.LtE, ast.Gt, ast.GtE),
+)
+
+
+class _Floats(ast.NodeTransformer):
+    """Whole numbers as floats: their powers may take for ever."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.Constant:  # noqa: N802 (the library's name)
+        assert isinstance(node.value, int | float)
+        return ast.copy_location(ast.Constant(float(node.value)), node)
+
+
+class VectorExpression:
+    """A vector as a function of positions and time.
+
+    Parameters
+    ----------
+    text
+        An expression for each component, with commas between: numbers, ``+ - * / ** %``, comparisons, parentheses,
+        ``x``, ``y``, ``z`` [D], ``t`` [D/U], ``pi``, ``e``, :data:`FUNCTIONS`, and the names in `numbers`.
+    components
+        How many there are.
+    numbers
+        Further names and what they stand for.
+
+    Raises
+    ------
+    ValueError
+        If it is no such expression; says what and where.
+    """
+
+    def __init__(self, text: str, components: int, numbers: Mapping[str, float]) -> None:
+        self.components = components
+        self._names = {**numbers, **CONSTANTS, **FUNCTIONS}
+        if len(text) > LONGEST:
+            raise ValueError(f"too long, {len(text)} characters; at most {LONGEST}")
+        try:
+            tree = ast.parse(text.strip(), mode="eval")
+        except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+            where = f" near character {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
+            raise ValueError(f"no expression{where}; write one such as 1 + 0.2*sin(2*pi*t), 0") from None
+        parts = tree.body.elts if isinstance(tree.body, ast.Tuple) else [tree.body]
+        if len(parts) != components:
+            raise ValueError(f"{len(parts)} components, and there are {components} directions; put commas between them")
+        try:
+            for part in parts:
+                self._check(part)
+            expressions = [ast.fix_missing_locations(ast.Expression(_Floats().visit(part))) for part in parts]
+            self._codes = [compile(expression, "expression", "eval") for expression in expressions]
+            self(np.zeros((2, components)), 0.0)
+        except (RecursionError, MemoryError):
+            raise ValueError("too deep") from None
+
+    def _check(self, part: ast.expr) -> None:
+        called = {id(node.func) for node in ast.walk(part) if isinstance(node, ast.Call)}
+        for node in ast.walk(part):
+            wrong = not isinstance(node, ALLOWED)
+            if isinstance(node, ast.Constant):
+                wrong = type(node.value) not in (int, float)
+            elif isinstance(node, ast.Name):
+                self._check_name(node.id)
+                wrong = (node.id in FUNCTIONS) != (id(node) in called)
+            elif isinstance(node, ast.Call):
+                wrong = bool(node.keywords) or not isinstance(node.func, ast.Name)
+                if isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
+                    wanted = getattr(FUNCTIONS[node.func.id], "nin", 3)
+                    if len(node.args) != wanted:
+                        raise ValueError(f"{node.func.id} takes {wanted} arguments, not {len(node.args)}")
+            if wrong:
+                raise ValueError(f"{shown(ast.unparse(node))} cannot be used in an expression")
+
+    def _check_name(self, name: str) -> None:
+        known = [*"xyz"[: self.components], "t", *self._names]
+        if name not in known:
+            raise ValueError(f"unknown name {shown(name)}; known: {', '.join(known)}")
+
+    def __call__(self, position: FloatArray, time: float) -> FloatArray:
+        """Return the vectors (m, components) at positions (m, components) and a time.
+
+        Raises
+        ------
+        ValueError
+            If a function takes other arguments.
+        """
+        # Columns of their own: numpy's functions round otherwise where numbers do not follow each other in memory.
+        columns = {name: np.ascontiguousarray(column) for name, column in zip("xyz", position.T, strict=False)}
+        names: dict[str, Any] = {"__builtins__": {}, **self._names, **columns, "t": np.float64(time)}
+        values = np.empty((len(position), self.components))
+        for component, code in enumerate(self._codes):
+            try:
+                with np.errstate(all="ignore"):
+                    values[:, component] = eval(code, names)  # noqa: S307 (checked above)
+            except (ArithmeticError, TypeError) as error:
+                raise ValueError(f"cannot be computed: {error}") from None
+        return values
