@@ -6,10 +6,13 @@ import alsph
 import numpy as np
 import pytest
 from alsph.analysis.probes import points
-from alsph.cases import Body, TaylorGreen
+from alsph.cases import Body, Cylinder, TaylorGreen
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError, RunFolderError
+from alsph.running.outputs import remarks_of
 from alsph.study.declaration import digest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from PIL import Image
 
 POINTS = "0.3,0.2; 0.5,0.1:0.5,0.9:9"
@@ -111,6 +114,20 @@ def test_inside_a_body_there_is_nothing(tmp_path):
     run = body.run(tmp_path / "run", until=0.05, probes=[inside, outside], progress=False)
     assert np.isnan(run.probes.velocity[:, 0]).all() and np.isfinite(run.probes.velocity[:, 1]).all()
     assert np.isnan(run.sample(inside)["pressure"]).all() and np.isfinite(run.sample(outside)["pressure"]).all()
+    remark = "probes: 1 of the points lies in a body, as (2, 0): what they record is no flow; move them"
+    assert f"remark: {remark}" in (run.path / "run.log").read_text()
+
+
+@given(st.floats(-1, 1), st.floats(-1, 1))
+@settings(max_examples=60, deadline=None)
+def test_probes_in_a_body_are_remarked_on(x, y):
+    """As the true circle has it, but within half a spacing of its surface."""
+    case = Cylinder(resolution=10, length=5, height=4, upstream=2)
+    beyond = np.hypot(x, y) - 0.5
+    if abs(beyond) > 0.05:
+        config = Config(case, RunSettings(probes=[[2 + x, y], [4.0, 1.0]]))
+        found = [remark for remark in remarks_of(config, case.build().state) if remark.startswith("probes: 1 of")]
+        assert bool(found) == (beyond < 0)
 
 
 def test_a_run_without_probes_has_none_and_keeps_its_name(tmp_path):

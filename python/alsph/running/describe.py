@@ -9,6 +9,7 @@ from alsph.config import Config
 from alsph.engine.simulation import Simulation
 from alsph.errors import SolverError
 from alsph.geometry.particles import Kind
+from alsph.running.outputs import remarks_of
 from alsph.text import duration
 
 PROBE_SECONDS = 5.0
@@ -65,7 +66,7 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
             lines.append(("warning", f"breaks down in the first steps: {error}"))
     if warning := case.time_step_warning():
         lines.append(("warning", warning))
-    return lines + [("remark", remark) for remark in case.remarks()]
+    return lines + [("remark", remark) for remark in remarks_of(config, problem.state)]
 
 
 def _seconds_per_step(simulation: Simulation) -> float:

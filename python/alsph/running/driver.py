@@ -17,7 +17,7 @@ from alsph.folder import checkpoint
 from alsph.folder.run_folder import RunFolder
 from alsph.running import beginning
 from alsph.running.control import Control, interruptible
-from alsph.running.outputs import outputs_of
+from alsph.running.outputs import outputs_of, remarks_of
 from alsph.running.progress import Reporter
 from alsph.running.provenance import describe, peak_memory, provenance
 from alsph.text import duration
@@ -67,7 +67,7 @@ class Driver:
         self.deadline = control.deadline
         verb = "resumed" if self.simulation.step else "started"
         self.folder.log(f"{verb} at {self.where}: {describe(self.provenance)}")
-        remarks = self.config.case.remarks()
+        remarks = remarks_of(self.config, self.simulation.state())
         for remark in remarks:
             self.folder.log(f"remark: {remark}")
         with Reporter(self.config.until, self.simulation.time, enabled=control.progress) as reporter:

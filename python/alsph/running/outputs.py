@@ -15,6 +15,7 @@ from alsph.engine.output import Output
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError
 from alsph.folder import samples
+from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
 
 PROBE_INTERVAL = 0.05
@@ -59,6 +60,30 @@ class SurfacePressure(Samples):
         """Return C_p."""
         pressure = super().sample(simulation, rows)["pressure"]
         return {"pressure_coefficient": 2 * (pressure - rows["inlet_pressure"][-1])}
+
+
+def remarks_of(config: Config, state: Mapping[str, Any]) -> list[str]:
+    """Return what is to be said of a run's case and of its probes, given its particles at the start."""
+    return [*config.case.remarks(), *_in_a_body(config.probes, state)]
+
+
+def _in_a_body(probes: FloatArray, state: Mapping[str, Any]) -> list[str]:
+    """Remark on probes below the surface of the solid particle next to them."""
+    solid = np.asarray(state["kind"]) == Kind.SOLID
+    if not (len(probes) and solid.any()):
+        return []
+    from scipy.spatial import KDTree  # takes its time
+
+    position, normal, depth = (np.asarray(state[name])[solid] for name in ("position", "normal", "depth"))
+    away, next_ = KDTree(position).query(probes)
+    fluid = KDTree(np.asarray(state["position"])[~solid]).query(probes)[0]
+    below = ((probes - position[next_]) * normal[next_]).sum(axis=1) < depth[next_]
+    inside = probes[(away < fluid) & below]
+    if not len(inside):
+        return []
+    where = ", ".join(f"{x:g}" for x in inside[0])
+    are = "of the points lies" if len(inside) == 1 else "of the points lie"
+    return [f"probes: {len(inside)} {are} in a body, as ({where}): what they record is no flow; move them"]
 
 
 def outputs_of(config: Config) -> list[Output]:
