@@ -236,3 +236,14 @@ def test_expressions_are_parameters_like_others(tmp_path):
     assert run.config.case == case and "inlet_velocity = " in (run.path / "case.toml").read_text()
     alsph.resume(run.path, until=0.2, progress=False)
     assert alsph.repeat(run.path, progress=False).same
+
+
+def test_a_turning_cylinder_has_a_mean_lift(tmp_path):
+    names = [
+        [
+            measure.name
+            for measure in Cylinder(**SMALL, **more).run(tmp_path / str(k), until=0.1, progress=False).measures
+        ]
+        for k, more in enumerate(({}, {"surface_velocity": "-y, x - upstream"}))
+    ]
+    assert "mean lift coefficient" not in names[0] and "mean lift coefficient" in names[1]

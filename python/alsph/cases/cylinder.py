@@ -61,8 +61,13 @@ class Cylinder(Channel):
         return self.length * self.height - math.pi * RADIUS**2
 
     def measures(self, run: Record) -> list[Measure]:
-        """Return forces and Strouhal number, and the error of the pressure coefficient where its curve is known."""
+        """Return forces and Strouhal number, and the error of the pressure coefficient where its curve is known.
+
+        With a rule, such as that of a surface that slides, also the mean lift.
+        """
         measures = super().measures(run)
+        if self.rules:
+            measures.append(Measure("mean lift coefficient", run.lift.mean))
         for profile in self.profiles(run):
             (angle, mean), expected = profile.computed, np.interp(profile.computed[0], *profile.reference)
             error = np.abs(mean - expected)[angle > 10].max()
