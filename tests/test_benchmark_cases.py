@@ -14,13 +14,16 @@ from alsph.cases import (
     Cavity,
     Couette,
     Cylinder,
+    CylinderPair,
     Poiseuille,
     PressureJump,
+    PulsatingChannel,
     TaylorGreen,
 )
 from alsph.cases.backward_facing_step import last_upward_zero
 from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind
+from balance import loads
 from scipy.spatial import KDTree
 from synthetic import write_flow
 
@@ -42,7 +45,7 @@ def test_walls_continue_the_lattice_of_the_fluid(model):
     assert near.max() == 45 if periodic else (near == 45).all()
 
 
-@pytest.mark.parametrize("model", [Cavity, Poiseuille, Couette, BackwardFacingStep, PressureJump])
+@pytest.mark.parametrize("model", [Cavity, Poiseuille, Couette, PulsatingChannel, BackwardFacingStep, PressureJump])
 def test_a_few_steps_stay_sound(model):
     simulation = model(resolution=10).simulation(threads=1)
     volume = simulation.counts["fluid"] / 100
@@ -129,6 +132,46 @@ def test_plate_flow_follows_the_exact_transient(model, tmp_path):
     case = model(resolution=16)
     run = case.run(tmp_path / "run", until=1.0, threads=1, progress=False)
     assert case.measures(run)[0].value < 0.015
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 1.0, 5.0])
+@pytest.mark.parametrize("womersley", [1.0, 4.0, 10.0])
+def test_exact_pulsating_flow_solves_its_equation_and_is_steady_without_pulsation(womersley, amplitude):
+    case = PulsatingChannel(reynolds=20, womersley=womersley, amplitude=amplitude)
+    y, step, period = np.linspace(0.02, 0.98, 49), 1e-3, 2 * np.pi / case.frequency
+    assert 0.5 / np.sqrt(1 / case.frequency / case.reynolds) == pytest.approx(womersley)
+    for time in np.array([0, 0.2, 0.7]) * period:
+        rate = (case.profile(y, time + step) - case.profile(y, time - step)) / (2 * step)
+        bend = (case.profile(y + step, time) - 2 * case.profile(y, time) + case.profile(y - step, time)) / step**2
+        force = case.body_force()[0] + case.forcing(y, time)[0]
+        assert rate == pytest.approx(bend / case.reynolds + force, abs=2e-3 * (1 + amplitude))
+        assert case.profile(np.array([0.0, 1.0]), time) == pytest.approx(0, abs=1e-12)
+        assert case.profile(y, time + period) == pytest.approx(case.profile(y, time))
+    if amplitude == 0:
+        assert case.profile(y, 0.3) == pytest.approx(4 * y * (1 - y))
+
+
+@pytest.mark.parametrize(("womersley", "amplitude"), [(2.0, 1.0), (6.0, 4.0)])
+def test_a_pulsating_flow_follows_the_exact_one(womersley, amplitude, tmp_path):
+    case = PulsatingChannel(resolution=20, womersley=womersley, amplitude=amplitude)
+    run = case.run(tmp_path / "run", until=0.8, threads=1, progress=False)
+    (measure,) = run.measures
+    assert measure.passed and measure.value < 0.003
+    assert run.profiles[0].reference[0].size and run.summary()["relative L2 error of the velocity"]
+
+
+@pytest.mark.parametrize(("stagger", "pitch"), [(90, 1.5), (0, 3.0), (30, 2.0)])
+def test_two_cylinders_are_where_they_should_be_and_their_loads_balance(stagger, pitch):
+    room = {"reynolds": 100, "length": 8, "height": 7, "upstream": 3, "perturbation": 0.0}
+    case = CylinderPair(resolution=10, pitch=pitch, stagger=stagger, **room)
+    first, second = (np.array(outline.centroid.coords[0]) for outline in case.outlines)
+    assert second - first == pytest.approx(pitch * np.array([np.cos(np.radians(stagger)), np.sin(np.radians(stagger))]))
+    assert case.blocked == pytest.approx({90: 2.0, 0: 1.0, 30: 2.0}[stagger], abs=1e-9)
+    found = loads(case, 1.0, 1.6, 0.02)
+    assert found.recorded[0] == pytest.approx(found.boxes[0], rel=0.05)
+    assert found.recorded[1] == pytest.approx(found.boxes[1], abs=0.03 * found.boxes[0])
+    if stagger != 30:
+        assert found.largest_lift < 1e-3
 
 
 def test_plates_refuse_a_period_shorter_than_the_support():

@@ -23,15 +23,20 @@ from alsph.cases.cavity import Cavity
 from alsph.cases.channel import Channel
 from alsph.cases.couette import Couette
 from alsph.cases.cylinder import Cylinder
+from alsph.cases.cylinder_pair import CylinderPair
 from alsph.cases.poiseuille import Poiseuille
 from alsph.cases.pressure_jump import PressureJump
+from alsph.cases.pulsating_channel import PulsatingChannel
 from alsph.cases.taylor_green import TaylorGreen
 from alsph.errors import ConfigError
 from alsph.parameters import suggest
 
 CASES: dict[str, type[Case]] = {
     case.name: case
-    for case in (Cylinder, Body, BackwardFacingStep, Cavity, Poiseuille, Couette, PressureJump, TaylorGreen)
+    for case in (
+        *(Cylinder, CylinderPair, Body, BackwardFacingStep, Cavity),
+        *(Poiseuille, Couette, PulsatingChannel, PressureJump, TaylorGreen),
+    )
 }
 
 __all__ = [
@@ -44,8 +49,10 @@ __all__ = [
     "Channel",
     "Couette",
     "Cylinder",
+    "CylinderPair",
     "Poiseuille",
     "PressureJump",
+    "PulsatingChannel",
     "TaylorGreen",
     "find",
 ]

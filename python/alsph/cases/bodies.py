@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import shapely
 from pydantic import model_validator
+from shapely import LineString
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
@@ -116,6 +117,12 @@ class Bodies(Channel):
         """Larger extent of the body, of the smallest one if there are several [D]."""
         lower, upper = np.split(shapely.bounds(shapely.get_parts(self.outline)), 2, axis=1)
         return float((upper - lower).max(axis=1).min())
+
+    @property
+    def blocked(self) -> float:
+        """How much of the channel's height the bodies block, what stands behind another but once [D]."""
+        sides = [LineString([(0, bottom), (0, top)]) for _, bottom, _, top in shapely.bounds(self.outlines)]
+        return float(shapely.union_all(sides).length)
 
     def scales(self) -> dict[str, float]:
         """Return those of the flow and the thickness of the body's thinnest part."""

@@ -96,9 +96,14 @@ class Channel(Case):
 
     def remarks(self) -> list[str]:
         """Return what is to be said of the resolution, the method and the channel."""
-        _, bottom, right, top = self.bounds
-        behind = self.length - self.upstream - right
-        return [*super().remarks(), *remarks.channel(top - bottom, self.upstream, behind, self.height)]
+        behind = self.length - self.upstream - self.bounds[2]
+        return [*super().remarks(), *remarks.channel(self.blocked, self.upstream, behind, self.height)]
+
+    @property
+    def blocked(self) -> float:
+        """How much of the channel's height the body blocks [D]."""
+        _, bottom, _, top = self.bounds
+        return top - bottom
 
     @property
     def default_until(self) -> float:

@@ -1,4 +1,4 @@
-"""What Poiseuille and Couette flow share: fluid between two parallel plates, and the error of its profile."""
+"""What flows between plates share: fluid between two parallel plates, and the error of its profile."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TERMS = np.arange(1, 401)[:, None]
 
 
 class Plates(Case):
-    """Flow along x between no-slip plates at y = 0 and y = D, periodic along x; it starts from rest."""
+    """Flow along x between no-slip plates at y = 0 and y = D, periodic along x."""
 
     upper_velocity: ClassVar[float]
     source: ClassVar[str]
@@ -43,6 +43,10 @@ class Plates(Case):
     @abstractmethod
     def profile(self, y: FloatArray, time: float) -> FloatArray:
         """Return the exact velocity (n,) along x [U] at heights y (n,) [D] and a time [D/U]."""
+
+    def initial_profile(self, y: FloatArray) -> FloatArray:
+        """Return the velocity (n,) along x at the start [U] at heights y (n,) [D]: rest."""
+        return np.zeros_like(y)
 
     @property
     def default_until(self) -> float:
@@ -78,13 +82,14 @@ class Plates(Case):
         return round(self.length * self.resolution) * (self.resolution + 2 * self.support_layers)
 
     def particles(self) -> dict[str, NDArray[Any]]:
-        """Return a lattice of fluid at rest between the solid particles of the plates."""
+        """Return a lattice of fluid between the solid particles of the plates."""
         region = shapely.box(0, 0, self.length, 1)
         solid = walls(region, self.particle_spacing, self.support_layers)
         x, y = solid.position.T
         period = (x > 0) & (x < self.length)
+        fluid = cells(region, self.particle_spacing)
         return join(
-            particles(Kind.FLUID, cells(region, self.particle_spacing), 0.0),
+            particles(Kind.FLUID, fluid, self.initial_profile(fluid[:, 1])[:, None] * [1.0, 0.0]),
             solid.where(period & (y < 0)).particles(),
             solid.where(period & (y > 1)).particles([self.upper_velocity, 0.0], body=1),
         )
