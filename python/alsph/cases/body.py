@@ -23,8 +23,9 @@ from alsph.geometry.surface import Surface, along, edges
 class Body(Bodies):
     """Flow past a body of any shape in a channel with free-slip walls and uniform inflow U.
 
-    D is the side of the square, the chord of the airfoil, or the unit of the file's lengths. A file holds points, two
-    numbers a line, in any of the usual orders and forms; several closed curves are several bodies. The centroid, that
+    D is the side of the square, the chord of the airfoil, the unit of the file's lengths, or the larger extent of a
+    drawing; `scale` multiplies them. A file holds points, two numbers a line, in any of the usual orders and forms, or
+    is a drawing (SVG, DXF, GeoJSON); several closed curves are several bodies. The centroid, that
     of all of them together, lies at (upstream, 0). The solid particles follow the surface. What is thinner than 2 Δx,
     such as a sharp trailing edge, is cut off (:attr:`carried`); a body of which that leaves less than half is refused.
     Forces are formed with D; moments with the chord c, the body's extent along x before it is turned, about c/4.
@@ -33,12 +34,16 @@ class Body(Bodies):
     name: ClassVar[str] = "body"
     title: ClassVar[str] = "flow past a body of any shape in a channel"
     body_name: ClassVar[str] = "body"
-    made_for: ClassVar[tuple[str, ...]] = ("shape", "angle_of_attack")
+    made_for: ClassVar[tuple[str, ...]] = ("shape", "scale", "angle_of_attack")
 
     shape: str | Outline = Field(
         default="square_cylinder",
-        description="square_cylinder, a NACA airfoil of four or five digits, such as naca0012, or a text file of "
-        "points: one or several closed curves, lengths in D; in Python also arrays of points or shapely's polygons",
+        description="square_cylinder, a NACA airfoil of four or five digits, such as naca0012, a text file of "
+        "points: one or several closed curves, lengths in D; a drawing (.svg, .dxf, .geojson), its larger extent D; "
+        "in Python also arrays of points or shapely's polygons",
+    )
+    scale: float | None = Field(
+        default=None, gt=0, description="factor by which the lengths of the shape are multiplied; none: 1 [-]"
     )
     angle_of_attack: float = Field(default=0.0, ge=-180, le=180, description="angle of attack, nose up [degrees]")
 
@@ -66,6 +71,8 @@ class Body(Bodies):
         """The body, or all bodies together, their centroid at the origin, turned by the angle of attack."""
         polygons = [named(self.shape)] if isinstance(self.shape, str) else self.shape.polygons
         outline = polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
+        if self.scale is not None:
+            outline = affinity.scale(outline, self.scale, self.scale, origin=(0, 0))
         centred = affinity.translate(outline, -outline.centroid.x, -outline.centroid.y)
         return affinity.rotate(centred, -self.angle_of_attack, origin=(0, 0))
 

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
 from alsph.errors import ConfigError
+from alsph.geometry import drawing
 from alsph.parameters import Parameters
 
 LARGEST_FILE = 2**20
@@ -99,7 +100,7 @@ class Outline(Parameters):
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a file.
+        """Read a file, of points or a drawing (:mod:`alsph.geometry.drawing`).
 
         Raises
         ------
@@ -107,6 +108,14 @@ class Outline(Parameters):
             If it holds no outline; the message names file and line.
         """
         name = _shown(os.path.basename(path))
+        if drawing.is_drawing(Path(path)):
+            bodies, remark = drawing.read(Path(path))
+            try:
+                found = cls.of(bodies)
+            except ConfigError as error:
+                raise ConfigError(f"{name}: {error}") from None
+            remarks = "; ".join(filter(None, (remark, found.remark)))
+            return cls(file=name, sha256=found.sha256, points=found.points, remark=remarks)
         return cls._around(_curves(_text(path), name), name)
 
     @classmethod
