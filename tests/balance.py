@@ -53,7 +53,8 @@ def loads(case: Case, start: float, until: float, every: float = 0.05, threads: 
         fields = [state[name][fluid] for name in ("position", "velocity", "pressure")]
         boxes = [(corners[0] - margin, corners[1] + margin) for margin in MARGINS]
         fluid_values = case.particle_spacing, 1.0, case.kinematic_viscosity
-        balances.append([sampling.control_volume(*fields, box, *fluid_values) for box in boxes])
+        force = case.body_force_at(fields[0], simulation.time)
+        balances.append([sampling.control_volume(*fields, box, *fluid_values, force) for box in boxes])
         samples.append(simulation.sample(surface.position)["pressure"])
         reached.append(simulation.time)
     taken, span = np.array(reached), reached[-1] - reached[0]

@@ -1,5 +1,7 @@
 """What is prescribed by place and time: body forces and sliding surfaces beside exact solutions, and expressions."""
 
+import pickle
+
 import alsph
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from alsph.cases import BackwardFacingStep, Cavity, Couette, Cylinder, Poiseuill
 from alsph.errors import ConfigError
 from alsph.expressions import FUNCTIONS, VectorExpression
 from alsph.geometry.particles import Kind
+from balance import loads
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -85,6 +88,21 @@ def test_a_cylinder_that_turns_is_lifted_as_it_should_be():
     late = history["time"] > 6
     assert -3.4 < history["lift_coefficient"][late].mean() < -2.0
     assert (history["cylinder_viscous_torque" if "cylinder_viscous_torque" in history else "viscous_torque"] != 0).any()
+
+
+def test_loads_with_a_body_force_are_the_momentum_balance():
+    """The inflow being given, it is taken up by pressure, which pushes the body against it."""
+    room = {"reynolds": 100, "resolution": 10, "length": 7, "height": 6, "upstream": 2.5, "perturbation": 0.0}
+    plain, pushed = (loads(Cylinder(**room, **more), 1.0, 1.6, 0.02) for more in ({}, {"driving_force": "0.3, 0.5"}))
+    assert pushed.recorded[0] == pytest.approx(pushed.boxes[0], rel=0.05)
+    assert pushed.recorded[1] == pytest.approx(pushed.boxes[1], abs=0.05)
+    assert np.abs(pushed.boxes - plain.boxes).min() > 0.1
+
+
+def test_a_case_with_expressions_goes_to_other_processes():
+    case = Cylinder(**SMALL, inlet_velocity="1 + 0.1*sin(t)*cos(y), 0")
+    copy = pickle.loads(pickle.dumps(case))
+    assert copy == case and (copy.inflow(POINTS, 0.3) == case.inflow(POINTS, 0.3)).all()
 
 
 def test_references_of_other_flows_are_not_used(tmp_path):

@@ -321,6 +321,7 @@ def test_the_momentum_balance_is_of_the_snapshots_in_the_window(folder):
         velocity = wild * 0.5 * time**2 * np.array([1.0, 0.5]) + 0 * position
         pressure = wild * push * -time * (position @ [1.0, 0.5])
         return SimpleNamespace(
+            time=time,
             position=position,
             velocity=np.where(solid[:, None], 99, velocity),
             pressure=np.where(solid, 99, pressure),

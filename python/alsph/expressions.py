@@ -58,6 +58,7 @@ class VectorExpression:
 
     def __init__(self, text: str, components: int, numbers: Mapping[str, float]) -> None:
         self.components = components
+        self._arguments = text, components, dict(numbers)
         self._names = {**numbers, **CONSTANTS, **FUNCTIONS}
         if len(text) > LONGEST:
             raise ValueError(f"too long, {len(text)} characters; at most {LONGEST}")
@@ -77,6 +78,10 @@ class VectorExpression:
             self(np.zeros((2, components)), 0.0)
         except (RecursionError, MemoryError):
             raise ValueError("too deep") from None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Be made anew in another process: compiled code cannot go there."""
+        return VectorExpression, self._arguments
 
     def _check(self, part: ast.expr) -> None:
         called = {id(node.func) for node in ast.walk(part) if isinstance(node, ast.Call)}

@@ -202,10 +202,12 @@ def control_volume(
     spacing: float,
     density: float,
     viscosity: float,
+    body_force: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Surface force on the fluid in a box and its momentum, whose balance gives the force on the body inside.
+    """Force on the fluid in a box from outside and its momentum, whose balance gives the force on the body inside.
 
-    The force on the body is ``surface - d(momentum)/dt``: what comes in through the faces less what stays in the fluid.
+    The force on the body is ``force - d(momentum)/dt``: what comes in through the faces, and by the body force, less
+    what stays in the fluid.
 
     Parameters
     ----------
@@ -216,10 +218,12 @@ def control_volume(
         Corners; the faces must lie in the fluid.
     spacing, density, viscosity : float
         Particle spacing Δx, density ρ and kinematic viscosity ν.
+    body_force : ndarray, shape (n, d), optional
+        Per unit mass.
 
     Returns
     -------
-    surface, momentum : ndarray, shape (d,)
+    force, momentum : ndarray, shape (d,)
     """
     lower, upper = box
     dimensions = len(lower)
@@ -235,7 +239,8 @@ def control_volume(
         surface += sign * area * traction.sum(axis=0)
     centre, half = (lower + upper) / 2, (upper - lower) / 2
     share = np.clip((half - np.abs(position - centre)) / spacing + 0.5, 0, 1).prod(axis=1)
-    return surface, density * spacing**dimensions * (share @ velocity)
+    mass = density * spacing**dimensions * share
+    return surface if body_force is None else surface + mass @ body_force, mass @ velocity
 
 
 def _faces(lower: FloatArray, upper: FloatArray, spacing: float) -> Iterator[tuple[int, int, FloatArray, float]]:

@@ -21,7 +21,7 @@ from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.method import Method
 from alsph.engine.output import Output
-from alsph.engine.prescribed import Rule, inlets
+from alsph.engine.prescribed import Rule, asked, inlets
 from alsph.engine.problem import Problem
 from alsph.engine.simulation import Simulation, bytes_per_particle, time_step_limits
 from alsph.errors import ConfigError
@@ -212,6 +212,13 @@ class Case(Method):
             Forces (n, d), or one (d,), by position and time alone [U²/D].
         """
         return self._given("driving_force", position, time)
+
+    def body_force_at(self, position: FloatArray, time: float) -> FloatArray:
+        """Return the whole body force per unit mass (n, d) at positions (n, d) [D] and a time [D/U]: [U²/D]."""
+        constant = np.broadcast_to(np.array(self.body_force(), float), position.shape)
+        rule = self.rules.get("forcing")
+        changing = asked("forcing", rule, position, time) if rule else None
+        return constant if changing is None else constant + changing
 
     def sliding(self, position: FloatArray, time: float) -> ArrayLike | None:
         """Return the velocity of the surfaces of bodies that stay in place, which is asked for in every step.

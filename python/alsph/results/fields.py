@@ -175,7 +175,8 @@ class Fields:
         fluid = snapshot.fluid
         viscosity = self.config.case.kinematic_viscosity
         fields = snapshot.position[fluid], snapshot.velocity[fluid], snapshot.pressure[fluid]
-        return sampling.control_volume(*fields, box, self.spacing, 1.0, viscosity)
+        force = self.config.case.body_force_at(fields[0], snapshot.time)
+        return sampling.control_volume(*fields, box, self.spacing, 1.0, viscosity, force)
 
 
 def checked_box(lower: Sequence[float], upper: Sequence[float], dimensions: int) -> tuple[FloatArray, FloatArray]:

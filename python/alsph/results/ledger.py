@@ -11,7 +11,6 @@ from alsph.analysis import sampling
 from alsph.analysis.record import Record
 from alsph.arrays import AXES, FloatArray
 from alsph.cases.base import Case
-from alsph.engine.prescribed import asked
 from alsph.geometry.particles import Snapshot
 
 
@@ -123,10 +122,7 @@ def _budget(snapshot: Snapshot, case: Case) -> tuple[float, float]:
     position, velocity, volume = snapshot.position[fluid], snapshot.velocity[fluid], spacing**case.space_dimensions
     gradient = sampling.interpolate(*_with_images(position, velocity, case), position, spacing)[1]
     strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
-    force = np.array(case.body_force())
-    if "forcing" in case.rules:
-        force = force + asked("forcing", case.rules["forcing"], position, snapshot.time)
-    power = (velocity * force).sum()
+    power = (velocity * case.body_force_at(position, snapshot.time)).sum()
     return 2 * case.kinematic_viscosity * volume * float((strain**2).sum()), volume * float(power)
 
 
