@@ -9,7 +9,7 @@ use crate::settings::Settings;
 /// be the same to the last bit.
 pub type Rule<const D: usize> = Box<dyn FnMut(&[Vector<D>], f64) -> Result<Vec<Vector<D>>> + Send + Sync>;
 
-/// The rules of a simulation, each asked once a step, at the positions of its derivatives and in the middle of it.
+/// The rules of a simulation, each asked once a step, at the positions of its derivatives and for the time in the middle of it.
 #[derive(Default)]
 pub struct Forcing<const D: usize> {
     /// Body force per unit mass, added to that of the settings.
@@ -54,6 +54,8 @@ impl<const D: usize> Forcing<D> {
             frame.images.blank(&mut force.field, particles.len());
             frame.images.real(&mut force.field).copy_from_slice(&values);
             frame.images.fill(&mut force.field);
+        } else {
+            force.field.clear();
         }
         if let Some(rule) = &mut self.surface_velocity {
             let own = |i: &usize| settings.bodies[particles.body[*i] as usize].velocity.is_none();

@@ -70,6 +70,47 @@ fn what_a_rule_gives_everywhere_is_what_the_settings_give() {
     }
 }
 
+#[test]
+fn a_rule_that_is_taken_away_acts_no_more() {
+    let (value, particles) = channel();
+    let mut simulations = [Some(()), None].map(|pushed| {
+        let body_force = pushed.and_then(|()| everywhere([0.0, 0.0]));
+        simulation(common::parse(&value), &particles, Forcing { body_force, surface_velocity: None })
+    });
+    let [pushed, plain] = &mut simulations;
+    pushed.advance(3, None).expect("stable");
+    plain.advance(3, None).expect("stable");
+    let mut once = 0;
+    pushed.forcing.body_force = Some(Box::new(move |position, _| {
+        once += 1;
+        Ok(vec![Vector::repeat(if once > 1 { f64::NAN } else { 0.0 }); position.len()])
+    }));
+    pushed.advance(1, None).expect("asked once");
+    pushed.forcing.body_force = None;
+    pushed.advance(20, None).expect("asked no more");
+    plain.advance(21, None).expect("stable");
+    assert_eq!(bits(pushed), bits(plain));
+
+    let mut value = value;
+    value["adaptive_time_step"] = false.into();
+    let still = |body_force| simulation(common::parse(&value), &particles, Forcing { body_force, surface_velocity: None });
+    let (mut pushed, mut plain) = (still(everywhere([5.0, 0.0])), still(None));
+    pushed.advance(1, None).expect("stable");
+    pushed.forcing.body_force = None;
+    let before: Vec<_> = (0..particles.real).map(|i| pushed.particles().velocity[i][0]).collect();
+    pushed.advance(1, None).expect("stable");
+    plain.advance(1, None).expect("stable");
+    let fluid = |simulation: &Simulation<2>| {
+        let particles = simulation.particles();
+        (0..particles.real)
+            .find(|&i| particles.kind[i] == ParticleKind::Fluid && (particles.position[i][1] - 0.5).abs() < 0.1)
+    };
+    let i = fluid(&pushed).expect("some");
+    let gained = pushed.particles().velocity[i][0] - before[i];
+    let step = pushed.settings().time_step;
+    assert!((gained / step - FORCE[0]).abs() < 1.0, "{gained} in {step}");
+}
+
 /// du/dt = cos t in a periodic box of fluid.
 #[test]
 fn a_force_that_changes_in_time_is_integrated_at_second_order() {

@@ -1,11 +1,14 @@
 """What is prescribed by place and time: body forces and sliding surfaces beside exact solutions, and expressions."""
 
+import gc
 import pickle
+import weakref
 
 import alsph
 import numpy as np
 import pytest
 from alsph.cases import BackwardFacingStep, Cavity, Couette, Cylinder, Poiseuille, TaylorGreen
+from alsph.engine.prescribed import Prescription, difference
 from alsph.errors import ConfigError
 from alsph.expressions import FUNCTIONS, VectorExpression
 from alsph.geometry.particles import Kind
@@ -137,6 +140,77 @@ def test_what_a_force_raises_comes_out_as_it_is_and_the_simulation_goes_on(small
     assert (simulation.snapshot()["velocity"] == plain.snapshot()["velocity"]).all()
 
 
+def test_a_force_that_is_taken_away_acts_no_more():
+    case = Couette(resolution=10)
+    pushed = case.simulation(threads=1)
+    pushed.prescribe(forcing=lambda position, time: [1.0, 0.0])
+    pushed.advance(3)
+    pushed.prescribe(forcing=None)
+    plain = case.restored(pushed.state(), threads=1)
+    for simulation in (pushed, plain):
+        simulation.advance(20)
+    assert (pushed.snapshot()["velocity"] == plain.snapshot()["velocity"]).all()
+
+
+def test_what_is_not_named_stays_and_what_cannot_be_is_refused():
+    turning = Cylinder(**SMALL, surface_velocity="-y, x - upstream").simulation(threads=1)
+    turning.prescribe(forcing=lambda position, time: [0.1, 0.0])
+    assert turning.rules.keys() == {"forcing", "sliding"}
+    turning.prescribe(forcing=None)
+    assert turning.rules.keys() == {"sliding"}
+    with pytest.raises(ConfigError, match="sliding: each body has a velocity of its own"):
+        Couette(resolution=10).simulation(threads=1).prescribe(sliding=lambda position, time: [1.0, 0.0])
+
+
+def test_a_simulation_with_rules_goes_when_it_is_not_needed():
+    simulation = Couette(resolution=10, driving_force="t, 0", surface_velocity="1, 0").simulation(threads=1)
+    simulation.advance(1)
+    known = weakref.ref(simulation)
+    del simulation
+    gc.collect()
+    assert known() is None
+
+
+def test_an_expression_may_come_and_go_in_mid_run(tmp_path):
+    path = Couette(resolution=10).run(tmp_path / "run", until=0.1, progress=False).path
+    settings, plain = path / "case.toml", (path / "case.toml").read_text()
+    told = 'driving_force = "t, 0"\nsurface_velocity = "where(y > 0.5, 1, 0), 0"\n'
+    for until, text in ((0.2, told + plain), (0.3, plain)):
+        settings.write_text(text)
+        with pytest.warns(RuntimeWarning, match="goes on with other settings than before: .*driving_force"):
+            alsph.resume(path, until=until, progress=False)
+        assert alsph.repeat(path, progress=False).same
+
+
+def test_a_force_in_one_place_is_known_by_it(small):
+    position = np.random.default_rng(2).uniform(-5, 5, (5000, 2))
+
+    def local(strength):
+        return lambda position, time: strength * np.exp(-100 * (position**2).sum(axis=1))[:, None] * [1.0, 0.0]
+
+    then = {"forcing": Prescription.of(0.3, position, local(1.0)(position, 0.3))}
+    assert difference({"forcing": local(1.0)}, then) == "" and len(then["forcing"].position) <= 512
+    assert "another body force" in difference({"forcing": local(1.1)}, then)
+
+
+def test_names_that_mean_two_things_are_refused():
+    class Heated(Cylinder):
+        name = "heated_for_names"
+        t: float = 7.0
+
+    with pytest.raises(ConfigError, match="t is a parameter of the case, too"):
+        Heated(**SMALL, driving_force="t, 0")
+    assert Heated(**SMALL, driving_force="x, 0").rules
+
+
+def test_a_class_of_an_expression_of_its_own_keeps_its_references():
+    class Blown(Poiseuille):
+        name = "blown"
+        driving_force: str | None = "0, 0"
+
+    assert not Blown().is_driven and Blown(driving_force="1, 0").is_driven and Blown().rules.keys() == {"forcing"}
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [
@@ -152,7 +226,7 @@ def test_a_force_that_is_none_is_refused(small, values, message):
     simulation.prescribe(forcing=lambda position, time: values)
     with pytest.raises(ConfigError, match=message):
         simulation.advance(1)
-    simulation.prescribe()
+    simulation.prescribe(forcing=None)
     simulation.advance(1)
 
 
@@ -169,6 +243,10 @@ POINTS = np.random.default_rng(1).uniform(-2, 2, (40, 2))
         ("6*(y/height + 0.5)*(0.5 - y/height), x % 1", lambda x, y, t: (6 * (y / 4 + 0.5) * (0.5 - y / 4), x % 1)),
         ("where(x > 0, t, -t), hypot(x, y)**2", lambda x, y, t: (np.where(x > 0, t, -t), np.hypot(x, y) ** 2)),
         ("(x >= y) * e, minimum(x, 1)", lambda x, y, t: ((x >= y) * np.e, np.minimum(x, 1))),
+        (
+            "(x > 0) + (x > 1), (t > 0.5) - (y < 0)",
+            lambda x, y, t: (1.0 * (x > 0) + (x > 1), (t > 0.5) - 1.0 * (y < 0)),
+        ),
         (" ( 1 , 2 ) ", lambda x, y, t: (1 + 0 * x, 2 + 0 * x)),
     ],
 )
@@ -209,6 +287,9 @@ def test_expressions_are_what_numpy_makes_of_them(text, values):
         ("__import__('os').system('true'), 0", "cannot be used"),
         ("9**9**9**9, 0", "cannot be computed"),
         ("1/0, 0", "cannot be computed: float division by zero"),
+        ("0 < x < 1, 0", "write two comparisons"),
+        ("(-1)**0.5*x, 0", "is a complex number"),
+        ("9" * 400 + ", 0", "a number in it is too large"),
         ("(" * 300 + "1" + ")" * 300 + ", 0", "no expression|too deep"),
         ("1" + "+1" * 2000 + ", 0", "too long"),
         ("-" * 1900 + "1, 0", "no expression|too deep"),

@@ -30,11 +30,16 @@ ALLOWED = (
 
 
 class _Floats(ast.NodeTransformer):
-    """Whole numbers as floats: their powers may take for ever."""
+    """Whole numbers, whose powers may take for ever, and comparisons, whose sum is no sum, as floats."""
 
     def visit_Constant(self, node: ast.Constant) -> ast.Constant:  # noqa: N802 (the library's name)
         assert isinstance(node.value, int | float)
         return ast.copy_location(ast.Constant(float(node.value)), node)
+
+    def visit_Compare(self, node: ast.Compare) -> ast.Call:  # noqa: N802
+        compared = self.generic_visit(node)
+        assert isinstance(compared, ast.Compare)
+        return ast.Call(ast.Name("where", ast.Load()), [compared, ast.Constant(1.0), ast.Constant(0.0)], [])
 
 
 class VectorExpression:
@@ -59,6 +64,8 @@ class VectorExpression:
     def __init__(self, text: str, components: int, numbers: Mapping[str, float]) -> None:
         self.components = components
         self._arguments = text, components, dict(numbers)
+        own = {*"xyzt", *CONSTANTS, *FUNCTIONS}
+        self._twice = own & numbers.keys()
         self._names = {**numbers, **CONSTANTS, **FUNCTIONS}
         if len(text) > LONGEST:
             raise ValueError(f"too long, {len(text)} characters; at most {LONGEST}")
@@ -78,6 +85,8 @@ class VectorExpression:
             self(np.zeros((2, components)), 0.0)
         except (RecursionError, MemoryError):
             raise ValueError("too deep") from None
+        except OverflowError:
+            raise ValueError("a number in it is too large") from None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Be made anew in another process: compiled code cannot go there."""
@@ -89,6 +98,8 @@ class VectorExpression:
             wrong = not isinstance(node, ALLOWED)
             if isinstance(node, ast.Constant):
                 wrong = type(node.value) not in (int, float)
+            elif isinstance(node, ast.Compare) and len(node.ops) > 1:
+                raise ValueError(f"{shown(ast.unparse(node))}: write two comparisons, as (0 < x)*(x < 1)")
             elif isinstance(node, ast.Name):
                 self._check_name(node.id)
                 wrong = (node.id in FUNCTIONS) != (id(node) in called)
@@ -103,6 +114,8 @@ class VectorExpression:
 
     def _check_name(self, name: str) -> None:
         known = [*"xyz"[: self.components], "t", *self._names]
+        if name in self._twice:
+            raise ValueError(f"{name} is a parameter of the case, too, and means something else; rename the parameter")
         if name not in known:
             raise ValueError(f"unknown name {shown(name)}; known: {', '.join(known)}")
 
@@ -121,7 +134,10 @@ class VectorExpression:
         for component, code in enumerate(self._codes):
             try:
                 with np.errstate(all="ignore"):
-                    values[:, component] = eval(code, names)  # noqa: S307 (checked above)
+                    found = eval(code, names)
+                if np.iscomplexobj(found):
+                    raise ValueError("is a complex number")
+                values[:, component] = found
             except (ArithmeticError, TypeError) as error:
                 raise ValueError(f"cannot be computed: {error}") from None
         return values

@@ -272,8 +272,12 @@ class Case(Method):
 
     @property
     def is_driven(self) -> bool:
-        """Whether an expression makes the flow another one than the references are of."""
-        return bool(self._expressions)
+        """Whether an expression, not of the class's own, makes the flow another one than its references are of."""
+        return bool(self._driven_by)
+
+    @property
+    def _driven_by(self) -> list[str]:
+        return [name for name in self._expressions if getattr(self, name) != type(self).model_fields[name].default]
 
     @classmethod
     def _overrides(cls, name: str) -> bool:
@@ -337,7 +341,7 @@ class Case(Method):
             *remarks.kernel(self.kernel, self.smoothing_ratio),
             *remarks.scheme(self.scheme, self.wall_pressure),
             *remarks.derived(type(self)),
-            *remarks.prescribed(list(self._expressions)),
+            *remarks.prescribed(self._driven_by),
             *remarks.penalty(self.expected_penalty_constant()),
         ]
 

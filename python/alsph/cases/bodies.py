@@ -100,6 +100,12 @@ class Bodies(Channel):
         """
         return self._solids
 
+    def fluid_volume(self) -> float:
+        """Return the area of the fluid; of bodies that are refused now, of which older runs may be, roughly [D²]."""
+        if any(remark.startswith(TOO_THIN) for remark in self.remarks()):
+            return float(self.length * self.height - shapely.union_all(self.carried).area)
+        return super().fluid_volume()
+
     def fluid(self, cells: FloatArray) -> FloatArray:
         """Return fluid evenly spaced around the bodies, as much as they leave of the cells."""
         position = np.concatenate([solid.position for solid in self._solids])

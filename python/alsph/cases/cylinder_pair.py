@@ -21,6 +21,8 @@ class CylinderPair(Bodies):
     name: ClassVar[str] = "cylinder_pair"
     title: ClassVar[str] = "flow past two cylinders, side by side or in tandem"
 
+    made_for: ClassVar[tuple[str, ...]] = ("pitch", "stagger")
+
     length: float = Field(default=16.0, gt=0, description="length of the channel [D]")
     height: float = Field(default=20.0, gt=0, description="height of the channel [D]")
     upstream: float = Field(default=5.0, gt=0, description="distance from the inlet to midway between them [D]")

@@ -237,10 +237,17 @@ def thin(name: str, shape: Polygon, left: Polygon | MultiPolygon, spacing: float
 
 def _coarsest(shape: Polygon, thick: float) -> int:
     """Return the least resolution that carries enough of a body of a given thickness [D], which all finer ones do."""
-    resolution = math.ceil(THINNEST / thick - 0.05)
-    while carried(shape, 1 / resolution).area < LEAST_LEFT * shape.area:
-        resolution += 1 + resolution // 50
-    return resolution
+    least = math.ceil(THINNEST / thick - 0.05)
+    enough = least
+    while carried(shape, 1 / enough).area < LEAST_LEFT * shape.area:
+        least, enough = enough + 1, 2 * enough
+    while least < enough:
+        middle = (least + enough) // 2
+        if carried(shape, 1 / middle).area < LEAST_LEFT * shape.area:
+            least = middle + 1
+        else:
+            enough = middle
+    return enough
 
 
 def derived(model: type) -> list[str]:

@@ -26,7 +26,7 @@ WORDS = {"inflow": "inflow", "forcing": "body force", "sliding": "velocity of su
 """What the rules prescribe."""
 
 KEPT = 256
-"""Of how many positions it is kept what a rule gave."""
+"""Of how many positions, and as many where it is largest, it is kept what a body force or sliding surface was."""
 
 ROUND_OFF = 1e-9
 """Share of the largest speed below which a velocity out of the domain is none."""
@@ -59,7 +59,9 @@ class Prescription:
     @classmethod
     def of(cls, time: float, position: FloatArray, values: FloatArray) -> Self:
         """Return what is kept of what a rule gave."""
-        some = slice(None, None, max(1, -(-len(position) // KEPT)))
+        spread = np.arange(0, len(position), max(1, -(-len(position) // KEPT)))
+        largest = np.argsort(-np.abs(values).max(axis=1), kind="stable")[:KEPT]
+        some = np.union1d(spread, largest)
         return cls(time, position[some], values[some])
 
 

@@ -24,6 +24,9 @@ from alsph.text import shown
 
 VERSION = _alsph.__version__
 
+AS_IT_IS: Any = object()
+"""Stands for a rule that is not named."""
+
 SLICE_SECONDS = 0.2
 """Longest time in the engine without a look at signals, so that Ctrl-C works."""
 
@@ -371,24 +374,40 @@ class Simulation:
         else:
             self._apply(velocity, self.inflow_position())
 
-    def prescribe(self, forcing: Rule | None = None, sliding: Rule | None = None) -> None:
+    def prescribe(self, *, forcing: Rule | None = AS_IT_IS, sliding: Rule | None = AS_IT_IS) -> None:
         """Prescribe a body force, and the velocity of surfaces, by functions that are called once a step.
+
+        What is not named stays as it is; None takes a function away.
 
         Parameters
         ----------
         forcing
-            Body force per unit mass beside that of the settings [U²/D]; none if None. A function of positions (m, d)
-            [D], those of the particles in the middle of the step, and the time there [D/U], which gives an array
+            Body force per unit mass beside that of the settings [U²/D]. A function of positions (m, d) [D], those that
+            the step takes its derivatives at, and the time in the middle of the step [D/U], which gives an array
             (m, d), or (d,) for a force that is the same everywhere. The time step does not follow it: give a smaller
             ``time_step`` where it is much larger than U²/D.
         sliding
             Likewise the velocity of the solid particles of bodies whose ``velocity`` is None [U], which stay where
-            they are, as those of a cylinder that rotates; that of the state if None.
+            they are, as those of a cylinder that rotates; without, that of the state.
 
+        Raises
+        ------
+        ConfigError
+            If surfaces are to slide, and each body has a ``velocity`` of its own.
+
+        Notes
+        -----
         The rules of a case are better its :meth:`alsph.cases.Case.forcing` and :meth:`alsph.cases.Case.sliding`. They
         are called in a thread of the engine, and cannot use the simulation.
         """
+        if callable(sliding) and all(body["velocity"] is not None for body in self.problem.settings["bodies"]):
+            raise ConfigError(
+                "sliding: each body has a velocity of its own; give those whose surface slides velocity = None, or "
+                "make it the method `sliding` of the case's class"
+            )
         for name, rule in (("forcing", forcing), ("sliding", sliding)):
+            if rule is AS_IT_IS:
+                continue
             for told in (self.rules, self.prescribed):
                 told.pop(name, None)
             if rule is not None:
@@ -402,15 +421,12 @@ class Simulation:
     def _hand_over(self) -> None:
         """Give the engine the rules that it asks itself."""
         with self._engine() as engine:
-            engine.prescribe(*(self._answer(name) if name in self.rules else None for name in ("forcing", "sliding")))
-
-    def _answer(self, name: str) -> Callable[[FloatArray, float], FloatArray]:
-        def answer(position: FloatArray, time: float) -> FloatArray:
-            values = np.ascontiguousarray(asked(name, self.rules[name], position, time))
-            self.prescribed[name] = Prescription.of(time, position, values)
-            return values
-
-        return answer
+            engine.prescribe(
+                *(
+                    _answer(name, self.rules[name], self.prescribed) if name in self.rules else None
+                    for name in ("forcing", "sliding")
+                )
+            )
 
     def _prescribe(self, steps: int) -> int:
         """Apply an inflow given as a function; return how many of `steps` may be taken until it is due again."""
@@ -419,7 +435,7 @@ class Simulation:
         position = self.inflow_position()
         velocity = self.rules["inflow"](position.copy(), self.time)
         if velocity is not None:
-            self.prescribed["inflow"] = Prescription.of(self.time, position, self._apply(velocity, position))
+            self.prescribed["inflow"] = Prescription(self.time, position, self._apply(velocity, position).copy())
         return 1
 
     def _apply(self, velocity: ArrayLike, position: FloatArray) -> FloatArray:
@@ -449,7 +465,18 @@ class Simulation:
         self._history = []
         if "inflow" in self.rules:
             self.set_inflow(self.rules["inflow"])
-        self.prescribe(self.rules.get("forcing"), self.rules.get("sliding"))
+        self.prescribe(forcing=self.rules.get("forcing"), sliding=self.rules.get("sliding"))
+
+
+def _answer(name: str, rule: Rule, prescribed: dict[str, Prescription]) -> Callable[[FloatArray, float], FloatArray]:
+    """Return what the engine asks: a rule, whose last answers are kept. It holds no simulation, which holds it."""
+
+    def answer(position: FloatArray, time: float) -> FloatArray:
+        values = np.ascontiguousarray(asked(name, rule, position, time))
+        prescribed[name] = Prescription.of(time, position, values)
+        return values
+
+    return answer
 
 
 def next_multiple(time: float, interval: float) -> float:

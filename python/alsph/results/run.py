@@ -384,7 +384,11 @@ class Run(Fields):
         Without a `reference`, that of :attr:`profiles` is drawn where there is one.
         """
         if reference is None:
-            known = (profile.reference for profile in self.profiles if profile.name == "pressure coefficient")
+            known = (
+                profile.reference
+                for profile in self.profiles
+                if profile.name == "pressure coefficient" and profile.reference[0].size
+            )
             reference = next(known, None)
         return self._saved(_plotting().pressure_coefficient(self.pressure_coefficient, reference), path)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from alsph import cases
 from alsph.analysis import sampling
-from alsph.cases.base import Case
+from alsph.cases.base import RULES, Case
 from alsph.cases.source import shown_name
 from alsph.config import Config
 from alsph.engine.prescribed import WORDS, difference
@@ -60,12 +60,13 @@ def unlike(case: Case, run: Run) -> list[str]:
     if was != own_case:
         same = shown_name(was) == shown_name(own_case)
         return [f"its case is {shown_name(was)}" + " as another text of that file has it" * same]
-    free = Case.model_fields.keys() | set(case.of_the_start)
+    free = (Case.model_fields.keys() | set(case.of_the_start)) - set(RULES.values())
     own = {name: value for name, value in Config(case).case_tables().items() if name not in {"case", *free}}
+    was = own | {name: run.case.get(name) for name in RULES.values()} | run.case
     return [
-        f"{name} = {reprlib.repr(run.case.get(name))} (here {reprlib.repr(value)})"
-        for name, value in own.items()
-        if run.case.get(name, value) != value
+        f"{name} = {reprlib.repr(was[name])} (here {reprlib.repr(own.get(name))})"
+        for name in dict.fromkeys([*own, *RULES.values()])
+        if was[name] != own.get(name)
     ]
 
 
@@ -185,7 +186,8 @@ def restored(config: Config, saved: Checkpoint, folder: RunFolder) -> Simulation
     except ConfigError as error:
         raise RunFolderError(f"{folder.path}: its checkpoint does not fit its case: {error}") from None
     for name in saved.prescribed:
-        if name not in simulation.rules:
+        was_told = (saved.case or {}).get(RULES[name]) is not None  # by a parameter, which may be taken away
+        if name not in simulation.rules and not was_told:
             raise RunFolderError(
                 f"{folder.path}: a function prescribes the {WORDS[name]} of the run, and its case does not tell of "
                 f"any; make it the method `{name}` of the case's class, and put that into alsph.cases.CASES before"
@@ -195,4 +197,5 @@ def restored(config: Config, saved: Checkpoint, folder: RunFolder) -> Simulation
 
 def rules_of(info: dict[str, Any]) -> list[str]:
     """Return the names of the rules that ``run.json`` tells of."""
-    return list(info.get("rules", ["inflow"] if info.get("inflow_function") else []))
+    names = info.get("rules", ["inflow"] if info.get("inflow_function") else [])
+    return [name for name in WORDS if isinstance(names, list) and name in names]

@@ -85,7 +85,7 @@ def repeat(path: str | Path, threads: int | None = None, *, progress: bool = Tru
     if parts[0][0] != 0:
         raise RunFolderError(f"{path}/run.json knows the run from step {parts[0][0]} on only; it cannot be repeated")
     beginning.check_class(parts[0][1].case, info, folder.path)
-    simulation = _begun(parts[0][1], threads, folder, info)
+    simulation = _begun(parts[0][1], parts[-1][1], threads, folder, info)
     bodies = [body["name"] for body in simulation.problem.settings["bodies"]]
     recorded = folder.path / "history.csv"
     start, until = info.get("start", {}).get("state_sha256"), parts[-1][1].until
@@ -122,8 +122,8 @@ def _environment(simulation: Simulation, folder: RunFolder, then: dict[str, Any]
     return found
 
 
-def _begun(first: Config, threads: int | None, folder: RunFolder, info: dict[str, Any]) -> Simulation:
-    """Return a simulation at the start of a run, with the flow that it began with."""
+def _begun(first: Config, last: Config, threads: int | None, folder: RunFolder, info: dict[str, Any]) -> Simulation:
+    """Return a simulation at the start of a run, with the flow that it began with and its first settings."""
     cannot = f"{folder.path}: cannot be repeated because"
     try:
         state = folder.read_start()
@@ -135,7 +135,7 @@ def _begun(first: Config, threads: int | None, folder: RunFolder, info: dict[str
         raise RunFolderError(f"{cannot} it began with the flow of another run, '{initial}', and has no {START}")
     simulation = first.case.restored(state, threads) if state else first.case.simulation(threads)
     for name in beginning.rules_of(info):
-        if name not in simulation.rules:
+        if name not in simulation.rules.keys() | last.case.rules.keys():
             raise RunFolderError(
                 f"{cannot} a function prescribes its {WORDS[name]}, and its case does not tell of any; make it the "
                 f"method `{name}` of the case's class"

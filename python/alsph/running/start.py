@@ -174,6 +174,9 @@ def _changes(now: Config, saved: Checkpoint, folder: RunFolder) -> list[str]:
     except ConfigError as error:
         raise RunFolderError(f"{folder.path}: the case of its checkpoint cannot be used: {error}") from None
     old, new = (case.problem(saved.state).settings for case in (before, now.case))
+    for one, two in zip(old["bodies"], new["bodies"], strict=False):
+        if None in (one["velocity"], two["velocity"]):  # surfaces that slide as `surface_velocity` says, or do no more
+            one["velocity"] = two["velocity"] = None
     fixed = [name for name in FIXED if old[name] != new[name]]
     made_for = [name for name in now.case.made_for if getattr(before, name) != getattr(now.case, name)]
     if fixed := made_for + fixed:
