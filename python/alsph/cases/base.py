@@ -451,7 +451,7 @@ class Case(Method):
 
     def _simulation(self, problem: Problem, threads: int | None) -> Simulation:
         simulation = Simulation(problem, threads, until=self.default_until)
-        rules = dict(self.rules)
+        rules = self.rules
         if "inflow" in rules:
             simulation.set_inflow(rules.pop("inflow"))
         simulation.prescribe(**rules)

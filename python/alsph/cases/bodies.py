@@ -85,9 +85,14 @@ class Bodies(Channel):
         return ["body"] if count == 1 else [f"body_{number}" for number in range(1, count + 1)]
 
     @cached_property
+    def _refusal(self) -> str:
+        """Why the resolution does not carry the bodies, empty if it does."""
+        return next((remark for remark in self.remarks() if remark.startswith(TOO_THIN)), "")
+
+    @cached_property
     def _solids(self) -> list[Solid]:
-        if too_thin := [remark for remark in self.remarks() if remark.startswith(TOO_THIN)]:
-            raise ConfigError(too_thin[0])
+        if self._refusal:
+            raise ConfigError(self._refusal)
         return solids(self.carried, self.particle_spacing, self.support_layers)
 
     def solids(self) -> list[Solid]:
@@ -102,7 +107,7 @@ class Bodies(Channel):
 
     def fluid_volume(self) -> float:
         """Return the area of the fluid; of bodies that are refused now, of which older runs may be, roughly [D²]."""
-        if any(remark.startswith(TOO_THIN) for remark in self.remarks()):
+        if self._refusal:
             return float(self.length * self.height - shapely.union_all(self.carried).area)
         return super().fluid_volume()
 
