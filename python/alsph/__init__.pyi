@@ -20,17 +20,20 @@ from .results.run import Run, open_run
 from .running.repetition import repeat
 from .running.start import resume
 from .study.autotune import autotune
+from .study.comparison import Comparison, compare
 from .study.convergence import converge
 from .study.validation import validate
 
 __version__: str
 
 __all__ = [
+    "Comparison",
     "Run",
     "Simulation",
     "__version__",
     "autotune",
     "cases",
+    "compare",
     "converge",
     "errors",
     "open_run",

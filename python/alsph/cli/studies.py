@@ -12,8 +12,12 @@ from alsph.cli.options import Jobs, Preset, Scheduler, StudyName, StudyOutput, W
 from alsph.cli.terminal import complain, exit_codes, say, say_table
 from alsph.running.control import seconds_of
 from alsph.study.board import overview
+from alsph.study.comparison import compare
 from alsph.study.validation import validate
 from alsph.text import printable
+
+LONGEST_NAME = 100
+"""Letters of the folder of a comparison."""
 
 
 class StudyGroup(TyperGroup):
@@ -90,6 +94,26 @@ def _study_draw(name: StudyName, preset: Preset = None, output: StudyOutput = Pa
 def _study_list() -> None:
     """List the studies that come with alsph."""
     say_table([(name, study.load(name).title) for name in study.shipped()])
+
+
+@app.command("compare")
+@exit_codes()
+def _compare(
+    paths: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="run folders; the first is the measure")],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="folder for table and figures", show_default="runs/comparison/RUN_RUN..."),
+    ] = None,
+) -> None:
+    """Compare runs: what differs in them, what they found, and how far apart they are.
+
+    Differences are those to the first run, with the ± of both added by squares.
+    """
+    comparison = compare(paths)
+    name = "_".join(comparison.runs).replace("/", "_")
+    say(f"{comparison}\n")
+    for path in comparison.save(output or Path("runs/comparison") / name[:LONGEST_NAME]):
+        say(path)
 
 
 @app.command("validate")

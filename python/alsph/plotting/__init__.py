@@ -2,7 +2,7 @@
 
 from alsph.plotting.animation import animate
 from alsph.plotting.curves import Curve, convergence, panels, pressure_coefficient, profile
-from alsph.plotting.histories import forces, ledger, spectrum
+from alsph.plotting.histories import coefficients, forces, ledger, spectrum
 from alsph.plotting.pictures import FIELDS, field, field_style, fields
 from alsph.plotting.style import remark, save
 
@@ -10,6 +10,7 @@ __all__ = [
     "FIELDS",
     "Curve",
     "animate",
+    "coefficients",
     "convergence",
     "field",
     "field_style",

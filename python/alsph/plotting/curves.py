@@ -98,23 +98,27 @@ def _finish_pressure(axes: Axes, coefficient: PressureCoefficient) -> None:
 
 
 def profile(curves: dict[str, Profile]) -> Figure:
-    """Draw computed curves, and the reference curve where it is known.
+    """Draw computed curves, and the reference curves where they are known.
 
     Parameters
     ----------
     curves : dict
-        The same profile of one run or several, by name; the last one's reference is drawn.
+        The same profile of one run or several, by name.
     """
     figure = blank(7, 4.5)
     axes = figure.subplots()
-    for name, curve in curves.items():
+    known: dict[str, tuple[int, str, Profile]] = {}
+    for index, (name, curve) in enumerate(curves.items()):
         axes.plot(*curve.computed, lw=1.2, label=name)
-    if curve.reference[0].size:
-        axes.plot(*curve.reference, "k:", lw=1.5, label=f"reference: {curve.source}")
+        if curve.reference[0].size:
+            known.setdefault(str(np.array(curve.reference).tolist()), (index, name, curve))
+    for index, name, curve in known.values():  # one for all, or that of each in its colour
+        colour, whose = (f"C{index}", f" of {name}") if len(known) > 1 else ("k", "")
+        axes.plot(*curve.reference, ":", color=colour, lw=1.5, label=f"reference{whose}: {curve.source}")
     axes.set(xlabel=curve.axes[0], ylabel=curve.axes[1])
     axes.set_title(curve.name, fontsize="medium")
     axes.grid(alpha=0.3)
-    axes.legend()
+    axes.legend(fontsize="small" if len(known) > 1 else None)
     return figure
 
 

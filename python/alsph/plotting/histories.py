@@ -28,7 +28,7 @@ def forces(run: Run, body: str | None = None) -> Figure:
         parts = {part: run.coefficient(axis, part, body) for part in ("viscous", "pressure", "total")}
         for (part, values), colour in zip(parts.items(), ("C2", "C1", "C0"), strict=True):
             axes.plot(time, values, colour, lw=1, label=part)
-        _robust_limits(axes, time, np.stack(list(parts.values())))
+        _robust_limits(axes, [(time, values) for values in parts.values()])
         axes.set_ylabel(f"${symbol}$")
         _finish(axes, run.window, legend=axes is upper)
     if run.window.edges.size and run.bodies:
@@ -38,6 +38,32 @@ def forces(run: Run, body: str | None = None) -> Figure:
         upper.set_title(f"mean $C_D$ = {drag.mean}", loc="left", fontsize="medium")
         strouhal = ",  no shedding found" if np.isnan(run.strouhal) else f",  Sr = {run.strouhal}"
         lower.set_title(f"rms $C_L$ = {lift.rms}{strouhal}", loc="left", fontsize="medium")
+    lower.set_xlabel(TIME_LABEL)
+    return figure
+
+
+def coefficients(runs: dict[str, Run]) -> Figure:
+    """Drag and lift coefficients of several runs over time, with dashes at the means over their averaging windows.
+
+    Parameters
+    ----------
+    runs : dict
+        Runs by the name they have in the figure.
+    """
+    figure = blank(9, 6)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    for axes, axis, symbol in ((upper, "x", "C_D"), (lower, "y", "C_L")):
+        records = [(run.history["time"], run.coefficient(axis)) for run in runs.values()]
+        for index, ((name, run), record) in enumerate(zip(runs.items(), records, strict=True)):
+            axes.plot(*record, f"C{index}", lw=1, label=f"{name}, {DEVELOPING}" if run.window.developing else name)
+            if run.window.edges.size:
+                axes.plot([run.window.start, run.window.end], [run.load(axis).mean] * 2, f"C{index}--", lw=1)
+        _robust_limits(axes, records)
+        axes.set_ylabel(f"${symbol}$")
+        axes.grid(alpha=0.3)
+    figure.legend(
+        *upper.get_legend_handles_labels(), loc="outside upper right", ncols=4, fontsize="small", frameon=False
+    )
     lower.set_xlabel(TIME_LABEL)
     return figure
 
@@ -80,11 +106,10 @@ def _finish(axes: Axes, window: Window, *, legend: bool = True) -> None:
         axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=5, frameon=False, fontsize="small", borderpad=0)
 
 
-def _robust_limits(axes: Axes, time: FloatArray, values: FloatArray) -> None:
-    """Scale the ordinate to the record without its start, where an impulsive start's forces tower over all else."""
-    if len(time) < 10:
-        return
-    late = values[:, time > time[0] + 0.1 * (time[-1] - time[0])]
+def _robust_limits(axes: Axes, records: list[tuple[FloatArray, FloatArray]]) -> None:
+    """Scale the ordinate to records without their start, where an impulsive start's forces tower over all else."""
+    long = [(time, values) for time, values in records if len(time) >= 10]
+    late = np.concatenate([values[time > time[0] + 0.1 * (time[-1] - time[0])] for time, values in long] or [[]])
     late = late[np.isfinite(late)]
     if late.size and np.ptp(late) > 0:
         margin = 0.15 * np.ptp(late)
