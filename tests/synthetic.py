@@ -113,7 +113,7 @@ def write_flow(path: Path, case, velocity, times=(0.0, 1.0, 2.0), pressure=0.0) 
         field = np.where(solid[:, None], state["velocity"], velocity(state["position"], time))
         derived = {
             "velocity_divergence": zero,
-            "vorticity": zero,
+            "vorticity": zero if case.space_dimensions == 2 else np.zeros((len(solid), 3)),
             "id": np.arange(len(solid)),
             "pressure": zero + pressure,
         }

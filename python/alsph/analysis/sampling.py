@@ -46,6 +46,12 @@ def fill(position: FloatArray, points: FloatArray, spacing: float) -> FloatArray
     return np.asarray(spacing ** points.shape[1] * kernel.sum(axis=1))
 
 
+def in_solid(snapshot: Snapshot, points: FloatArray) -> NDArray[np.bool_]:
+    """Whether points (m, d) lie in a body: nearer to one of its particles than to any of the fluid."""
+    _, nearest = neighbour_tree(snapshot.position).query(points)
+    return np.asarray(~snapshot.fluid[nearest])
+
+
 def checked_points(points: ArrayLike, dimensions: int) -> FloatArray:
     """Return points (m, d).
 

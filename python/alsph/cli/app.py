@@ -23,6 +23,7 @@ COMMANDS = {
     "repeat": ("runs", "Repeat a run from its start, without writing anything, and compare it bit by bit."),
     "info": ("runs", "Tell the state and the results of a run."),
     "plot": ("runs", "Draw the figures of a run."),
+    "export": ("runs", "Write a snapshot of a run on a regular grid, for other programs."),
     "compare": ("studies", "Compare runs: what differs in them, what they found, and how far apart they are."),
     "animate": ("runs", "Make a film of a field from the snapshots of a run."),
     "validate": ("studies", "Run cases at several resolutions and compare them with their references."),

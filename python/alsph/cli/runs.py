@@ -1,4 +1,4 @@
-"""The commands of a run folder: resume, repeat, info and plot."""
+"""The commands of a run folder: resume, repeat, info, plot, animate and export."""
 
 import functools
 from collections.abc import Callable
@@ -14,8 +14,10 @@ from alsph import plotting
 from alsph.cases.source import shown_name
 from alsph.cli.options import Retry, RunPath, Threads, Walltime
 from alsph.cli.terminal import complain, exit_codes, say, say_table
-from alsph.errors import RunFolderError
+from alsph.errors import ConfigError, RunFolderError
 from alsph.folder.durable import check_folder
+from alsph.parameters import choose
+from alsph.results.export import FORMATS
 from alsph.results.run import Run
 from alsph.running.control import seconds_of
 from alsph.running.repetition import repeat
@@ -162,6 +164,32 @@ def _animate(
 
         film = run.animate(field, output, every=every, fps=fps, limit=limit, progress=progress, **times)
     say(film)
+
+
+@app.command("export")
+@exit_codes()
+def _export(
+    path: RunPath,
+    to: Annotated[str | None, typer.Option(metavar="|".join(FORMATS), help="format", show_default="vtkhdf")] = None,
+    time: Annotated[float | None, typer.Option(help="time of the fields [D/U]", show_default="the last")] = None,
+    spacing: Annotated[float | None, typer.Option(help="of the grid [D]", show_default="the particles'")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="file, .vtkhdf, .nc or .csv", show_default="RUN/flow.vtkhdf"),
+    ] = None,
+) -> None:
+    """Write velocity, pressure and vorticity of a snapshot on a regular grid, for other programs.
+
+    ParaView 5.12 or later reads vtkhdf; netcdf needs pip install 'alsph[tables]'. Bodies are NaN.
+    """
+    if to is not None:
+        choose("to", to, FORMATS)
+    if output and to and output.suffix != FORMATS[to]:
+        raise ConfigError(f"{output}: a file in the format {to} ends in {FORMATS[to]}")
+    grid = Run(path).to_grid(time, spacing)
+    if time is not None:
+        complain(f"fields at t* = {grid.time:.6g}, the output nearest to {time:g}")
+    say(grid.save(output or path / f"flow{FORMATS[to or 'vtkhdf']}"))
 
 
 def say_run(run: Run) -> None:

@@ -45,8 +45,8 @@ START = "start.h5"
 MARKS = ("case.toml", "run.json")
 """What tells that a folder is a run folder."""
 OWN = re.compile(
-    r"\.?(case\.toml|run\.json|run\.log|\.?lock|(checkpoint(\.previous)?|history|particles|surface|probes|start|breakdown)(\.damaged\d*)?"
-    r"\.(h5|csv|vtkhdf))(\.new|\.journal)?"
+    r"\.?(case\.toml|run\.json|run\.log|\.?lock|(checkpoint(\.previous)?|history|particles|surface|probes|start|breakdown|flow)(\.damaged\d*)?"
+    r"\.(h5|csv|vtkhdf|nc))(\.new|\.journal)?"
     r"|(ledger|forces|spectrum|pressure(_coefficient)?|vorticity|velocity(_divergence|_at_tu_d_\w+)?|kinetic_energy"
     r"|[uv]_at_[xy]_d_2)\.(png|gif)"
 )

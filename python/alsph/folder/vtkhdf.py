@@ -1,9 +1,10 @@
-"""Particles over time as one temporal VTKHDF PolyData file, which ParaView opens (VTKHDF format 2.0).
+"""Particles over time as one temporal VTKHDF PolyData file, and grids as ImageData, which ParaView opens (format 2.0).
 
-Every output appends one part: its points, one vertex cell a point, and the point data. What is valid is what the
-attribute ``NSteps`` counts.
+Every output of particles appends one part: its points, one vertex cell a point, and the point data. What is valid is
+what the attribute ``NSteps`` counts.
 """
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,8 +41,8 @@ def append(path: Path, time: float, particles: dict[str, NDArray[Any]]) -> None:
         The arrays of :meth:`alsph.Simulation.snapshot`; vectors get a third component 0 in 2-D.
     """
     columns = {name: np.asarray(particles[name], dtype) for name, dtype in FIELDS.items()}
-    columns["velocity"] = _three_components(columns["velocity"])
-    points = _three_components(np.asarray(particles["position"], np.float32))
+    columns["velocity"] = three_components(columns["velocity"])
+    points = three_components(np.asarray(particles["position"], np.float32))
     with growing(path) as file:
         root = file["VTKHDF"] if "VTKHDF" in file else _create(file, points, columns)
         _append_part(root, time, points, columns)
@@ -55,6 +56,39 @@ def truncate(path: Path, time: float) -> None:
         keep = int(np.searchsorted(values[: steps.attrs["NSteps"]], time, side="right"))
         steps.attrs["NSteps"] = keep
         values.resize(keep, axis=0)
+
+
+def write_image(
+    path: Path, time: float, origin: Sequence[float], spacing: Sequence[float], fields: Mapping[str, NDArray[Any]]
+) -> None:
+    """Write fields at the points of a regular grid as VTKHDF ImageData.
+
+    Parameters
+    ----------
+    path
+        The file.
+    time
+        The time [D/U], in the field data.
+    origin, spacing
+        First point and distances, (d,) each [D].
+    fields
+        Arrays of shape (nx, ny) or (nx, ny, nz), of vectors with an axis more.
+    """
+    dimensions = len(origin)
+    counts = [*next(iter(fields.values())).shape[:dimensions], *[1] * (3 - dimensions)]
+    with h5py.File(path, "w") as file:
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"] = np.array([2, 0])
+        root.attrs.create("Type", b"ImageData", dtype=h5py.string_dtype("ascii", len("ImageData")))
+        root.attrs["WholeExtent"] = np.array([end for count in counts for end in (0, count - 1)])
+        root.attrs["Origin"] = np.array([*origin, 0.0][:3], float)
+        root.attrs["Spacing"] = np.array([*spacing, 1.0][:3], float)
+        root.attrs["Direction"] = np.eye(3).ravel()
+        root["FieldData/TimeValue"] = np.array([time])
+        for name, values in fields.items():
+            vector = three_components(values) if values.ndim > dimensions else values
+            table = vector.swapaxes(0, dimensions - 1).astype(np.float32)  # of dimension 2 in 2-D, as readers want it
+            root.create_dataset(f"PointData/{name}", data=table, compression="gzip", shuffle=True)
 
 
 def _create(file: h5py.File, points: NDArray[Any], columns: dict[str, NDArray[Any]]) -> h5py.Group:
@@ -123,5 +157,6 @@ def _write(table: h5py.Dataset, start: int, rows: Any) -> None:
     table[start:] = rows
 
 
-def _three_components(vectors: NDArray[Any]) -> NDArray[Any]:
-    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
+def three_components(vectors: NDArray[Any]) -> NDArray[Any]:
+    """Return vectors (..., d) with a third component 0 in 2-D."""
+    return np.pad(vectors, [(0, 0)] * (vectors.ndim - 1) + [(0, 3 - vectors.shape[-1])])

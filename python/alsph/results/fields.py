@@ -20,10 +20,12 @@ from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
 from alsph.geometry.particles import Snapshot
 from alsph.results import export
+from alsph.results.export import Grid
 from alsph.text import shown
 
 if TYPE_CHECKING:
     import pandas
+    import pyvista
     import xarray
 
 
@@ -118,16 +120,16 @@ class Fields:
         """
         return export.table(self.history)
 
-    def to_xarray(
+    def to_grid(
         self,
         time: float | None = None,
         spacing: float | None = None,
         lower: Sequence[float] | None = None,
         upper: Sequence[float] | None = None,
-    ) -> xarray.Dataset:
-        """Return velocity, pressure and, in 2-D, vorticity of a snapshot on a regular grid, by :meth:`sample`.
+    ) -> Grid:
+        """Return velocity, pressure and vorticity of a snapshot on a regular grid, by :meth:`sample`; NaN in bodies.
 
-        ``run.to_xarray().to_netcdf("flow.nc")`` makes a file for other programs.
+        ``run.to_grid().save("flow.vtkhdf")`` makes a file for ParaView, ``"flow.nc"`` and ``"flow.csv"`` for others.
 
         Parameters
         ----------
@@ -142,12 +144,38 @@ class Fields:
         Raises
         ------
         ConfigError
-            If xarray is not installed, or there is no such grid.
+            If there is no such grid.
         """
         domain, dimensions = self.config.case.domain(), self.config.case.space_dimensions
         corners = domain["lower"] if lower is None else lower, domain["upper"] if upper is None else upper
         box = checked_box(*corners, dimensions)
         return export.grid(self.snapshot(time), self.spacing, spacing, box, domain)
+
+    def to_xarray(
+        self,
+        time: float | None = None,
+        spacing: float | None = None,
+        lower: Sequence[float] | None = None,
+        upper: Sequence[float] | None = None,
+    ) -> xarray.Dataset:
+        """Return :meth:`to_grid`, which says what the parameters are, as a data set of xarray.
+
+        Raises
+        ------
+        ConfigError
+            If xarray is not installed, or there is no such grid.
+        """
+        return self.to_grid(time, spacing, lower, upper).to_xarray()
+
+    def to_pyvista(self, time: float | None = None) -> pyvista.PolyData:
+        """Return the particles of the snapshot nearest to a time [D/U], of the last one if None, as points of pyvista.
+
+        Raises
+        ------
+        ConfigError
+            If pyvista is not installed (``pip install 'alsph[3d]'``).
+        """
+        return export.cloud(self.snapshot(time))
 
     def momentum_balance(self, lower: tuple[float, ...], upper: tuple[float, ...]) -> FloatArray:
         """Mean force coefficients from the momentum balance of a box around the body: a check of the recorded loads.
