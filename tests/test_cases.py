@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 from alsph import _alsph
-from alsph.cases import CASES, Cylinder, TaylorGreen
+from alsph.cases import CASES, Body, Cylinder, TaylorGreen
 from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind
 from alsph.geometry.solids import cylinder_rings
@@ -213,3 +213,13 @@ def test_parameters_change_only_in_a_new_set():
         case.replace(reynold=100)
     with pytest.raises(ConfigError, match=r"cannot be changed; make another set with .replace\(reynolds=100\)"):
         case.reynolds = 100
+
+
+def test_a_case_is_shown_in_short_by_what_is_not_as_by_default():
+    angle = np.linspace(0, 2 * np.pi, 5000)[:-1]
+    body = Body(shape=np.stack([np.cos(angle), np.sin(angle)], axis=1), length=20.0, height=20.0, upstream=8.0)
+    assert repr(body).startswith("Body(length=20.0, height=20.0, upstream=8.0, shape=<points: a body of 4999 points>")
+    assert len(repr(body)) < 200 and str(body) == repr(body)
+    case = Cylinder(reynolds=100, time_step=0.01)
+    assert eval(repr(case), {"Cylinder": Cylinder}) == case
+    assert not {"model_dump", "model_fields", "copy", "dict"} & {*dir(case)} and "reynolds" in dir(case)

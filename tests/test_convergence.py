@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from alsph.cases import TaylorGreen
+from alsph.cases import Cylinder, TaylorGreen
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError
 from alsph.study import convergence
@@ -29,7 +29,7 @@ def test_order_and_limit_of_a_power_law_are_recovered_at_any_ratios(order, limit
 
 
 @pytest.mark.parametrize(
-    ("values", "kind"), [([1, 2, 1.5], "oscillating"), ([1, 2, 4], "diverging"), ([1, math.nan, 4], "diverging")]
+    ("values", "kind"), [([1, 2, 1.5], "oscillating"), ([1, 2, 4], "diverging"), ([1, math.nan, 4], "unknown")]
 )
 def test_what_is_no_monotonic_convergence_has_no_order(values, kind):
     found = grid_convergence("f", [10, 20, 40], values)
@@ -60,3 +60,14 @@ def test_a_case_is_run_judged_and_drawn(tmp_path):
     assert str(report) in text and "convergence.png" in text
     assert (report.path / "convergence.png").stat().st_size > 10_000
     assert convergence.SAFETY == 1.25
+
+
+def test_a_measure_that_is_nan_is_told_with_its_run_and_why(tmp_path):
+    config = Config(Cylinder(length=5, height=4, upstream=2), RunSettings(until=0.05))
+    report = converge(config, [8, 10, 12], tmp_path, progress=False)
+    strouhal = next(found for found in report.convergences if found.name == "Strouhal number")
+    assert strouhal.kind == "unknown"
+    folder = report.results.rows[0]["folder"]
+    (gap,) = [gap for gap in report.gaps if gap.startswith(f"D/Δx = 8, {folder}: no ")]
+    assert "Strouhal number" in gap and gap.endswith(strouhal.values[0].note) and f"- {gap}" in str(report)
+    assert report.gaps[0] in (report.path / "convergence.md").read_text()

@@ -5,6 +5,7 @@ import sys
 import alsph
 import numpy as np
 import pytest
+from alsph import Run
 from alsph.analysis.probes import points
 from alsph.cases import Body, Cylinder, TaylorGreen
 from alsph.config import Config, RunSettings
@@ -241,3 +242,14 @@ def test_a_library_that_is_not_there_is_told(vortices, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ConfigError, match="this needs pandas: pip install pandas"):
         vortices.to_pandas()
+
+
+def test_probes_given_several_times_are_joined(alsph, tmp_path):
+    options = "--resolution", 8, "--until", 0.1, "--output", tmp_path / "run"
+    code, _, _ = alsph("run", "taylor_green", "--probes", "0.5,0.5", *options, "--probes", "0.2,0.2:0.8,0.2:3")
+    assert code == 0
+    assert Run(tmp_path / "run").probes.position == pytest.approx(
+        np.array([[0.5, 0.5], [0.2, 0.2], [0.5, 0.2], [0.8, 0.2]])
+    )
+    code, _, err = alsph("run", "taylor_green", "--probes", "0.5,0.5", *options, "--probes", "x", "--force")
+    assert code == 2 and "probes" in err and len(err.splitlines()) == 1

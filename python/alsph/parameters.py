@@ -92,6 +92,15 @@ class Parameters(BaseModel):
         """Return the names to complete, without those of pydantic."""
         return [name for name in super().__dir__() if name not in PYDANTICS]
 
+    def __repr__(self) -> str:
+        """Return the call that makes the set: the parameters that are not as by default, cut where they are long."""
+        fields = type(self).model_fields
+        values = {name: getattr(self, name) for name in self.parameter_names()}
+        changed = {name: value for name, value in values.items() if repr(value) != repr(fields[name].default)}
+        return f"{type(self).__name__}({', '.join(f'{name}={shown(value)}' for name, value in changed.items())})"
+
+    __str__ = __repr__
+
     def _repr_html_(self) -> str:
         rows = "".join(
             f"<tr><th>{name}</th><td>{html.escape(shown(getattr(self, name)))}</td>"

@@ -63,12 +63,12 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
     def command(context: typer.Context, **values: Any) -> None:
         extra = {parameter.name: values.pop(parameter.name) for parameter in own}
         tables: dict[str, Any] = context.obj.tables() if context.obj else {"case": model.declaration(), "run": {}}
-        given = {name: value for name, value in values.items() if value is not None}
+        joined = {name: "; ".join(value) or None for name, value in values.items() if isinstance(value, list)}
+        given = {name: value for name, value in (values | joined).items() if value is not None}
         for name in cases.method.superseded(given, tables):
             tables.pop(name, None)
-        for name, value in values.items():
-            if value is not None:
-                (tables["run"] if name in RunSettings.model_fields else tables)[name] = value
+        for name, value in given.items():
+            (tables["run"] if name in RunSettings.model_fields else tables)[name] = value
         action(config.from_tables(tables), **extra)
 
     first = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
@@ -124,7 +124,7 @@ def _options(model: type[Parameters], names: Iterable[str], defaults: Mapping[st
             f"{flag}/--no-{flag[2:]}" if kind is bool else flag,
             help=f"{model.describe(name)}  [default: {defaults.get(name) or describe_default(model, name)}]",
             show_default=False,
-            metavar="|".join(map(str, choices)) or METAVARS.get(kind),
+            metavar="|".join(map(str, choices)) or METAVARS.get(kind) or ("TEXT" if kind == list[str] else None),
             parser=_choice_of(choices) if choices else _number_of(kind) if kind in WORDS else None,
         )
         yield inspect.Parameter(
@@ -135,9 +135,11 @@ def _options(model: type[Parameters], names: Iterable[str], defaults: Mapping[st
         )
 
 
-def _option_type(annotation: Any) -> tuple[type, tuple[Any, ...]]:
+def _option_type(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
     """Return the type that an option is read as, and its choices if there are few."""
     if get_origin(annotation) in (Union, types.UnionType):
+        if {str, list} <= {get_origin(member) or member for member in get_args(annotation)}:
+            return list[str], ()  # a text that lists things: the option may be repeated
         annotation = next(member for member in get_args(annotation) if member is not type(None))
     if get_origin(annotation) is Literal:
         return str, get_args(annotation)

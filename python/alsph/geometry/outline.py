@@ -177,6 +177,10 @@ class Outline(Parameters):
         except (ValueError, TypeError):
             raise ValueError(f"{self.file}: its points are not two numbers a line, three or more a body") from None
 
+    def __repr__(self) -> str:
+        """Tell what it is, without the points."""
+        return f"<{self}>"
+
     def __str__(self) -> str:
         """Name the file and tell what was found in it."""
         counts = ", ".join(str(len(polygon.exterior.coords) - 1) for polygon in self.polygons)

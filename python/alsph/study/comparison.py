@@ -20,6 +20,7 @@ from alsph.cases.remarks import keywords, tally
 from alsph.cases.source import shown_name
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder.durable import write_text
+from alsph.geometry.outline import Outline
 from alsph.results.run import Run
 from alsph.study.declaration import text
 from alsph.tables import markdown
@@ -206,17 +207,23 @@ def _labels(places: list[Path]) -> list[str]:
 def _parameters(run: Run) -> dict[str, str]:
     """Return all parameters of a run's case and the settings of the run, in words."""
     config, declared = run.config, run.config.case.declaration()
-    code = f", SHA-256 {declared['sha256'][:8]}" if isinstance(declared, dict) else ""
     values = {name: getattr(config.case, name) for name in config.case.parameter_names()}
     settings = {f"run.{name}": getattr(config.run, name) for name in type(config.run).model_fields}
     values |= settings | {"run.until": config.until}
-    return {"case": f"{shown_name(declared)}{code}"} | {name: _parameter(value) for name, value in values.items()}
+    case = f"{shown_name(declared)}{_sum(declared['sha256'])}" if isinstance(declared, dict) else declared
+    return {"case": case} | {name: _parameter(value) for name, value in values.items()}
 
 
 def _parameter(value: Any) -> str:
     if value is None:
         return "automatic"
-    return text(value) if isinstance(value, bool | int | float) else shown(str(value))[1:-1]
+    if isinstance(value, Outline):
+        return f"{value}{_sum(value.sha256)}"
+    return text(value) if isinstance(value, int | float) else shown(value if isinstance(value, list) else str(value))
+
+
+def _sum(sha256: str) -> str:
+    return f", SHA-256 {sha256[:8]}"
 
 
 def _costs(run: Run) -> dict[str, Any]:

@@ -42,7 +42,8 @@ class Convergence:
     values : tuple of float
         The result at each.
     kind : str
-        ``monotonic``, ``oscillating`` or ``diverging``: how the last three follow each other.
+        ``monotonic``, ``oscillating`` or ``diverging``: how the last three follow each other; ``unknown`` if one of
+        them is NaN.
     order : float
         Observed order p; NaN unless monotonic.
     richardson : float
@@ -95,8 +96,10 @@ def grid_convergence(
     coarse, fine = f2 - f1, f3 - f2
     scale = np.nan if reference == 0 or f3 == 0 else abs(f3)
     unknown = np.nan, np.nan
-    if fine == 0 or not np.isfinite([coarse, fine]).all():
-        return Convergence(name, *known, "diverging" if fine else "monotonic", *unknown, np.nan, reference)
+    if not np.isfinite([coarse, fine]).all():
+        return Convergence(name, *known, "unknown", *unknown, np.nan, reference)
+    if fine == 0:
+        return Convergence(name, *known, "monotonic", *unknown, np.nan, reference)
     ratio, r12, r23 = coarse / fine, n2 / n1, n3 / n2
     if ratio < 0:
         spread = np.ptp([f1, f2, f3]) / 2 / scale
@@ -134,8 +137,25 @@ class Report:
     results: Results
     convergences: list[Convergence]
 
+    @property
+    def gaps(self) -> list[str]:
+        """Which runs have not finished, and which measures are NaN in which run and why, in words."""
+        places = {float(row["resolution"]): f"D/Δx = {row['resolution']}, {row['folder']}" for row in self.results.rows}
+        states = zip(places.values(), self.results.states, strict=True)
+        gaps = [f"{place}: {state.status}" for place, state in states if state.status != "finished"]
+        missing: dict[tuple[str, str], list[str]] = {}
+        for found in self.convergences:
+            for resolution, value in zip(found.resolutions, found.values, strict=True):
+                if not np.isfinite(value):
+                    why = getattr(value, "note", "") or "the run does not tell"
+                    missing.setdefault((places[resolution], why), []).append(found.name)
+        return [*gaps, *(f"{place}: no {', '.join(names)}: {why}" for (place, why), names in missing.items())]
+
     def __str__(self) -> str:
-        """Return the table."""
+        """Return the table, and what is missing in it."""
+        return "\n\n".join(filter(None, (self._table(), "\n".join(f"- {gap}" for gap in self.gaps))))
+
+    def _table(self) -> str:
         if not self.convergences:
             return "nothing to judge: fewer than three runs have finished, or the case has no measures"
         resolutions = self.convergences[0].resolutions
