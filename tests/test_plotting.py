@@ -1,14 +1,20 @@
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from alsph import Run, plotting
 from alsph.analysis.loads import PressureCoefficient
+from alsph.cases import Body, Cavity, Cylinder, CylinderPair
+from alsph.config import Config
 from alsph.errors import ConfigError
+from alsph.folder.run_folder import RunFolder
 from alsph.geometry.particles import Snapshot
 from alsph.plotting.pictures import _limit
+from alsph.study.results import names
 from matplotlib.figure import Figure
-from synthetic import write_run
+from PIL import Image
+from synthetic import append_surface, history, write_flow, write_run
 
 
 @pytest.fixture(scope="module")
@@ -107,3 +113,87 @@ def test_figures_of_a_run_that_has_just_begun(run, tmp_path):
 def test_ledger_and_no_global_state(run, tmp_path):
     assert len(run.plot_ledger(tmp_path / "ledger.png").axes) == 8
     assert "matplotlib.pyplot" not in sys.modules
+
+
+def test_figures_name_case_reynolds_number_and_resolution(run):
+    told = r"cylinder, Re = 200, $D/\Delta x$ = 10"
+    figures = (
+        run.plot_ledger(),
+        run.plot_pressure_coefficient(),
+        run.plot_spectrum(),
+        *map(run.plot_profile, run.profiles),
+    )
+    assert [figure.get_suptitle() for figure in figures] == [told] * 4
+    assert run.plot_forces(body="cylinder").get_suptitle() == f"{told}, cylinder"
+
+
+def test_the_pressure_of_a_closed_box_is_drawn_less_its_mean(tmp_path):
+    """Whatever constant it has, which means nothing."""
+    still, pictures = lambda position, time: np.zeros_like(position), []
+    for offset in (0.0, 1e3):
+        flow = write_flow(tmp_path / f"{offset}", Cavity(resolution=10), still, pressure=offset)
+        snapshot = flow.snapshot()
+        pressure = snapshot.pressure + np.sin(6 * snapshot.position[:, 0])
+        figure = plotting.field(replace(snapshot, pressure=pressure), "pressure", flow.spacing)
+        pictures.append(figure.axes[0].images[0])
+        assert "less its mean" in figure.axes[1].get_ylabel()
+    assert pictures[0].get_clim() == pictures[1].get_clim() == (-1, 1)
+    one, other = (np.ma.filled(picture.get_array(), 0) for picture in pictures)
+    assert np.allclose(one, other, atol=1e-3)
+
+
+def test_the_pressure_of_an_open_channel_is_drawn_as_it_is(run):
+    figure = run.plot_field("pressure")
+    assert "mean" not in figure.axes[1].get_ylabel()
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory):
+    """Two cylinders, with the pressure coefficient 1 on the lower one and 2 on the upper one."""
+    case = CylinderPair(resolution=8, length=8, height=10, upstream=3)
+    path = write_flow(tmp_path_factory.mktemp("runs") / "pair", case, lambda position, time: 0 * position).path
+    surface = case.surface_points()
+    for time in (0.0, 1.0, 2.0):
+        append_surface(RunFolder(path), time, surface.arrays(), 1.0 + surface.part)
+    rows = history(end=2.0)
+    rows |= {name: rows[name].repeat(2, axis=1) for name in rows if name.endswith(("_force", "_torque"))}
+    RunFolder(path).append_history(rows, case.coefficient_bodies)
+    return Run(path)
+
+
+def test_one_body_of_several(pair, alsph, tmp_path):
+    first, second = pair.profiles
+    assert (first.name, second.name) == ("pressure coefficient of body_1", "pressure coefficient of body_2")
+    assert (first.computed[1] == 1).all() and (second.computed[1] == 2).all()
+    assert second.computed[0][[0, -1]] == pytest.approx([0, 0], abs=0.01) and second.computed[0].max() > 0.99
+    axes = pair.plot_pressure_coefficient(body="body_2").axes[0]
+    assert {2.0} == {value for line in axes.lines for value in line.get_ydata()}
+    assert "body_1, upper side" in [each.get_label() for each in pair.plot_pressure_coefficient().axes[0].lines]
+    with pytest.raises(ConfigError, match="did you mean 'body_1'"):
+        pair.plot_pressure_coefficient(body="body1")
+    code, out, _ = alsph("plot", pair.path, "--body", "body_2", "--format", "svg", "--output", tmp_path / "out")
+    made = {path.name for path in (tmp_path / "out").iterdir()}
+    assert code == 0 and made >= {
+        f"{kind}_of_body_2.svg" for kind in ("forces", "spectrum", "pressure_coefficient")
+    } | {"forces.svg", "pressure_coefficient_of_body_1.svg"}
+
+
+def test_formats_and_resolution_of_figures(pair, alsph, tmp_path):
+    sizes = []
+    for dpi in (50, 100):
+        assert alsph("plot", pair.path, "--dpi", dpi, "--output", tmp_path / f"{dpi}")[0] == 0
+        sizes.append(Image.open(tmp_path / f"{dpi}" / "ledger.png").size)
+    assert 2 * sizes[0][0] == sizes[1][0]
+    for options, words in (
+        (("--format", "bmp"), "format = 'bmp': unknown"),
+        (("--body", "body"), "body = 'body': unknown"),
+    ):
+        code, _, err = alsph("plot", pair.path, *options)
+        assert code == 2 and words in err and len(err.splitlines()) == 1
+    assert alsph("plot", pair.path, "--dpi", 0)[0] == 2
+
+
+def test_a_study_may_draw_the_pressure_coefficient_of_bodies():
+    assert "pressure coefficient" in names(Config(Body(resolution=10)))[1]
+    assert "pressure coefficient" in names(Config(Cylinder(reynolds=150)))[1]
+    assert "pressure coefficient of body_2" in names(Config(CylinderPair(resolution=10)))[1]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from alsph.analysis.averages import Estimate
 from alsph.arrays import FloatArray
+from alsph.errors import ConfigError
 from alsph.geometry.surface import Surface
 
 
@@ -70,6 +72,22 @@ class PressureCoefficient:
     samples: int
     developing: bool = False
     surface: Surface | None = None
+
+    def of(self, parts: Sequence[int]) -> PressureCoefficient:
+        """Return the coefficient on some of the closed curves, by their numbers.
+
+        Raises
+        ------
+        ConfigError
+            If an older version has not written where the samples were taken.
+        """
+        if self.surface is None:
+            raise ConfigError("pressure coefficient: an older version has not written which body it is of")
+        chosen = np.isin(self.surface.part, parts)
+        surface = Surface(**{name: values[chosen] for name, values in self.surface.arrays().items()})
+        return replace(
+            self, theta=self.theta[chosen], mean=self.mean[chosen], deviation=self.deviation[chosen], surface=surface
+        )
 
     def force(self, part: int | None = None) -> FloatArray:
         """Pressure parts of the mean drag and lift coefficient, −∮ C_p n ds: a check of the recorded ones.

@@ -287,6 +287,11 @@ class Case(Method):
         """Return where the surface pressure is sampled."""
         return None
 
+    @property
+    def surface_bodies(self) -> list[str]:
+        """Name of the body that each closed curve of the surface is of, in the order of their numbers."""
+        return self.coefficient_bodies
+
     def outputs(self) -> list[Output]:
         """Return what a run records beside particles, history and surface pressure."""
         return []

@@ -11,7 +11,7 @@ import shapely
 from pydantic import model_validator
 from shapely import LineString
 
-from alsph.analysis.measures import Measure
+from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
@@ -164,12 +164,35 @@ class Bodies(Channel):
             ),
         ]
 
+    def profiles(self, run: Record) -> list[Profile]:
+        """Return the mean pressure coefficient of each body over x/c, from the leading edge above and back below."""
+        names = self.coefficient_bodies
+        found, empty = [], np.empty(0)
+        for name in names:
+            computed, coefficient = (empty, empty), run.pressure_coefficient
+            if coefficient.surface:
+                coefficient = coefficient.of([k for k, each in enumerate(self.surface_bodies) if each == name])
+            if coefficient.surface and coefficient.surface.chord is not None:
+                computed = coefficient.surface.chord, coefficient.mean
+            title = "pressure coefficient" + f" of {name}" * (len(names) > 1)
+            found.append(Profile(title, ("$x/c$", "$C_p$"), computed, (empty, empty), ""))
+        return found
+
     def surface_points(self) -> Surface:
         """Return the pieces of the bodies as carried, from the foremost point over the upper side and back below."""
         left, _, right, _ = self.bounds
         return along(self._carried_parts, 0.0, (left, right)).moved(self.centre)
 
     @property
+    def surface_bodies(self) -> list[str]:
+        """Name of the body that each closed curve of the surface is of; one that is cut into parts has several."""
+        named = zip(self.coefficient_bodies, self._sampled, strict=True)
+        return [name for name, body in named for _ in shapely.get_parts(body)]
+
+    @property
+    def _sampled(self) -> list[shapely.Polygon | shapely.MultiPolygon]:
+        return [outline if left.is_empty else left for outline, left in zip(self.outlines, self.carried, strict=True)]
+
+    @property
     def _carried_parts(self) -> shapely.MultiPolygon:
-        bodies = [outline if left.is_empty else left for outline, left in zip(self.outlines, self.carried, strict=True)]
-        return shapely.MultiPolygon([part for body in bodies for part in shapely.get_parts(body)])
+        return shapely.MultiPolygon([part for body in self._sampled for part in shapely.get_parts(body)])

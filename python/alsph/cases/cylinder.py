@@ -69,6 +69,8 @@ class Cylinder(Channel):
         if self.rules:
             measures.append(Measure("mean lift coefficient", run.lift.mean))
         for profile in self.profiles(run):
+            if not profile.reference[0].size or not profile.computed[0].size:
+                continue
             (angle, mean), expected = profile.computed, np.interp(profile.computed[0], *profile.reference)
             error = np.abs(mean - expected)[angle > 10].max()
             name = "largest error of the pressure coefficient beyond 10 degrees"
@@ -76,15 +78,17 @@ class Cylinder(Channel):
         return measures
 
     def profiles(self, run: Record) -> list[Profile]:
-        """Return the mean pressure coefficient over the angle, the mean of both sides, where its curve is known."""
+        """Return the mean pressure coefficient over the angle, the mean of both sides."""
         known, found = self._reference(), run.pressure_coefficient
-        if known is None or known.pressure_coefficient is None or not found.theta.size:
-            return []
-        upper = found.theta <= 180
-        lower = np.interp(360 - found.theta[upper], found.theta, found.mean, period=360)
-        computed = found.theta[upper], (found.mean[upper] + lower) / 2
+        angle, mean = np.empty(0), np.empty(0)
+        if found.theta.size:
+            upper = found.theta <= 180
+            lower = np.interp(360 - found.theta[upper], found.theta, found.mean, period=360)
+            angle, mean = found.theta[upper], (found.mean[upper] + lower) / 2
         axes = r"$\theta$ from the front stagnation point [degrees]", "$C_p$"
-        return [Profile("pressure coefficient", axes, computed, known.pressure_coefficient, known.source)]
+        expected = known.pressure_coefficient if known else None
+        reference, source = (expected, known.source) if known and expected else ((np.empty(0), np.empty(0)), "")
+        return [Profile("pressure coefficient", axes, (angle, mean), reference, source)]
 
     def _reference(self) -> Reference | None:
         """Return the independent solution of this flow, None where there is none."""

@@ -1,10 +1,11 @@
 """The commands of a run folder: resume, repeat, info, plot, animate and export."""
 
 import functools
+import re
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -23,6 +24,9 @@ from alsph.running.control import seconds_of
 from alsph.running.repetition import repeat
 from alsph.running.start import resume
 from alsph.tables import markdown
+
+KINDS = ("png", "pdf", "svg")
+"""Formats of figures."""
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None)
 
@@ -101,6 +105,12 @@ def _plot(
         typer.Option(help="field to draw, may be repeated", show_default="vorticity and pressure; none in 3-D"),
     ] = None,
     time: Annotated[float | None, typer.Option(help="time of the fields [D/U]", show_default="the last")] = None,
+    body: Annotated[
+        list[str] | None,
+        typer.Option(help="body to draw forces and pressure coefficient of by itself, too, may be repeated"),
+    ] = None,
+    kind: Annotated[str, typer.Option("--format", metavar="png|pdf|svg", help="format of the figures")] = "png",
+    dpi: Annotated[int, typer.Option(min=10, max=2400, help="pixels an inch of png")] = 100,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="folder for the figures", show_default="RUN/figures")
     ] = None,
@@ -110,12 +120,26 @@ def _plot(
     These are the ledger of the run, its curves beside their reference, forces and their spectra,
     pressure coefficient, and fields.
     """
+    choose("format", kind, KINDS)
     run = Run(path)
     field = field or ([] if run.case.get("dimensions") == 3 else ["vorticity", "pressure"])
     for name in field:
         plotting.field_style(name)
     figures = output or path / "figures"
-    drawings: dict[str, Callable[[Path], object]] = {
+    drawings = _drawings(run, body or []) | {name: functools.partial(run.plot_field, name, time) for name in field}
+    if not output:
+        check_folder(figures)
+    figures.mkdir(parents=True, exist_ok=True)
+    if time is not None and field:
+        complain(f"fields at t* = {run.snapshot(time).time:.6g}, the output nearest to {time:g}")
+    for name, draw in drawings.items():
+        plotting.save(draw(), figures / f"{name}.{kind}", dpi=dpi)
+        say(figures / f"{name}.{kind}")
+
+
+def _drawings(run: Run, bodies: list[str]) -> dict[str, Callable[[], Any]]:
+    """Return what draws the figures of a run but those of fields, by name; some of single bodies."""
+    drawings: dict[str, Callable[[], Any]] = {
         profile.file_name: functools.partial(run.plot_profile, profile) for profile in run.profiles
     }
     drawings["ledger"] = run.plot_ledger
@@ -123,15 +147,14 @@ def _plot(
         drawings |= {"forces": run.plot_forces, "spectrum": run.plot_spectrum}
     if run.config.case.surface_points():
         drawings["pressure_coefficient"] = run.plot_pressure_coefficient
-    drawings |= {name: functools.partial(run.plot_field, name, time) for name in field}
-    if not output:
-        check_folder(figures)
-    figures.mkdir(parents=True, exist_ok=True)
-    if time is not None and field:
-        complain(f"fields at t* = {run.snapshot(time).time:.6g}, the output nearest to {time:g}")
-    for name, draw in drawings.items():
-        draw(figures / f"{name}.png")
-        say(figures / f"{name}.png")
+    for body in bodies:
+        choose("body", body, run.bodies)
+        name = "_".join(["of", *re.findall(r"\w+", body)])
+        drawings[f"forces_{name}"] = functools.partial(run.plot_forces, body=body)
+        drawings[f"spectrum_{name}"] = functools.partial(run.plot_spectrum, body=body)
+        if body in run.config.case.surface_bodies and run.config.case.surface_points():
+            drawings[f"pressure_coefficient_{name}"] = functools.partial(run.plot_pressure_coefficient, body=body)
+    return drawings
 
 
 @app.command("animate")

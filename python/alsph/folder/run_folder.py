@@ -47,8 +47,8 @@ MARKS = ("case.toml", "run.json")
 OWN = re.compile(
     r"\.?(case\.toml|run\.json|run\.log|\.?lock|(checkpoint(\.previous)?|history|particles|surface|probes|start|breakdown|flow)(\.damaged\d*)?"
     r"\.(h5|csv|vtkhdf|nc))(\.new|\.journal)?"
-    r"|(ledger|forces|spectrum|pressure(_coefficient)?|vorticity|velocity(_divergence|_at_tu_d_\w+)?|kinetic_energy"
-    r"|[uv]_at_[xy]_d_2)\.(png|gif)"
+    r"|(ledger|((forces|spectrum|pressure_coefficient)(_of_\w+)?)|pressure|vorticity|velocity(_divergence|_at_tu_d_\w+)?|kinetic_energy"
+    r"|[uv]_at_[xy]_d_2)\.(png|pdf|svg|gif|mp4|webm)"
 )
 """Names of the files that alsph makes in a run folder and its figures, and removes when the folder is replaced."""
 UNFINISHED = ("starting", "running", "interrupted")
@@ -174,7 +174,7 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
             if self._file("run.json").exists():
                 self.announce(configuration)  # before the run that it tells of is no more
-            for path in [*self.path.iterdir(), *self._file("figures").glob("*.png")]:
+            for path in [*self.path.iterdir(), *self._file("figures").glob("*")]:
                 # What tells that this is a run folder stays, so that a cut leaves one.
                 if own.fullmatch(path.name) and path.name not in (*MARKS, LOCK) and not path.is_dir():
                     path.unlink()

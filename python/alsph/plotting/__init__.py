@@ -4,7 +4,7 @@ from alsph.plotting.animation import animate
 from alsph.plotting.curves import Curve, convergence, panels, pressure_coefficient, profile
 from alsph.plotting.histories import coefficients, forces, ledger, spectrum
 from alsph.plotting.pictures import FIELDS, field, field_style, fields
-from alsph.plotting.style import remark, save
+from alsph.plotting.style import head, remark, save
 
 __all__ = [
     "FIELDS",
@@ -16,6 +16,7 @@ __all__ = [
     "field_style",
     "fields",
     "forces",
+    "head",
     "ledger",
     "panels",
     "pressure_coefficient",

@@ -15,6 +15,7 @@ from alsph.analysis.window import DEVELOPING
 from alsph.arrays import FloatArray
 from alsph.geometry.surface import Surface
 from alsph.plotting.style import blank
+from alsph.text import in_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +23,9 @@ if TYPE_CHECKING:
 
 
 def pressure_coefficient(
-    coefficient: PressureCoefficient, reference: tuple[FloatArray, FloatArray] | None = None
+    coefficient: PressureCoefficient,
+    reference: tuple[FloatArray, FloatArray] | None = None,
+    names: Sequence[str] = (),
 ) -> Figure:
     """Mean C_p of both sides: of a body with a chord over x/c and the distance along the surface, suction up.
 
@@ -33,9 +36,11 @@ def pressure_coefficient(
     coefficient : PressureCoefficient
     reference : (abscissa, value), optional
         A curve to compare with, over degrees from the front or x/c.
+    names : sequence of str, optional
+        Name of the body that each closed curve is of.
     """
     if coefficient.surface and coefficient.surface.chord is not None:
-        return _pressure_over_chord(coefficient, coefficient.surface, coefficient.surface.chord, reference)
+        return _pressure_over_chord(coefficient, coefficient.surface, coefficient.surface.chord, reference, names)
     figure = blank(7, 4.5)
     axes = figure.subplots()
     theta = np.mod(coefficient.theta, 360.0)
@@ -62,24 +67,26 @@ def _pressure_over_chord(
     surface: Surface,
     chord: FloatArray,
     reference: tuple[FloatArray, FloatArray] | None,
+    names: Sequence[str],
 ) -> Figure:
     figure = blank(10, 4.5)
     left, right = figure.subplots(1, 2, sharey=True)
-    several = surface.part.max() > 0
-    for part in np.unique(surface.part):
+    parts = [int(part) for part in np.unique(surface.part)]
+    of = {part: in_figure(names[part] if part < len(names) else str(part)) for part in parts}
+    for part in parts:
         for index, (side, name, line) in enumerate(((1, "upper side", "-"), (-1, "lower side", "--"))):
             chosen = (surface.part == part) & (surface.side == side)
             mean, deviation = coefficient.mean[chosen], coefficient.deviation[chosen]
-            colour = f"C{int(part) % 10}" if several else f"C{index}"
+            colour, label = (f"C{part % 10}", f"{of[part]}, {name}") if len(parts) > 1 else (f"C{index}", name)
             for axes, abscissa in ((left, chord), (right, surface.arc)):
-                axes.plot(abscissa[chosen], mean, line, color=colour, label=f"{part:.0f}, {name}" if several else name)
+                axes.plot(abscissa[chosen], mean, line, color=colour, label=label)
                 axes.fill_between(abscissa[chosen], mean - deviation, mean + deviation, color=colour, alpha=0.15, lw=0)
     if reference is not None:
         left.plot(*reference, "k:", lw=1.5, label="reference")
     left.set(xlabel="$x/c$", ylabel="$C_p$, suction up")
     right.set(xlabel="distance along the surface from the leading edge, $s/D$")
     left.invert_yaxis()  # of both
-    figure.suptitle(_samples(coefficient), fontsize="medium")
+    left.set_title(_samples(coefficient), loc="left", fontsize="small")
     for axes in (left, right):
         _finish_pressure(axes, coefficient)
     return figure

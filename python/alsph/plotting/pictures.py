@@ -149,9 +149,8 @@ def _draw_field(
     image = axes.imshow(picture, cmap=style.colours, vmin=lowest, vmax=limit, interpolation="bilinear", **frame)
     if body.any():
         axes.contourf(body, levels=[0.5, np.inf], colors=["0.35"], **frame)
-    axes.figure.colorbar(
-        image, ax=axes, label=style.label, extend="both" if style.signed else "max", pad=0.02, fraction=0.05
-    )
+    label = style.label + (", less its mean" if name == "pressure" and _is_closed(snapshot) else "")
+    axes.figure.colorbar(image, ax=axes, label=label, extend="both" if style.signed else "max", pad=0.02, fraction=0.05)
     axes.set(xlabel="$x/D$", ylabel="$y/D$", aspect="equal")
     return limit
 
@@ -163,7 +162,14 @@ def colour_limit(snapshot: Snapshot, name: str, spacing: float, extent: tuple[fl
 
 def _values(snapshot: Snapshot, name: str) -> FloatArray:
     values = np.linalg.norm(snapshot.velocity, axis=1) if name == "velocity" else getattr(snapshot, name)
+    if name == "pressure" and _is_closed(snapshot):
+        values = values - values[snapshot.fluid].mean()  # which means nothing, and would leave one colour
     return np.asarray(values)
+
+
+def _is_closed(snapshot: Snapshot) -> bool:
+    """Whether no fluid enters or leaves, so that the pressure is known but for a constant."""
+    return not np.isin(snapshot.kind, (Kind.INLET, Kind.OUTLET)).any()
 
 
 def extent_of(

@@ -52,6 +52,11 @@ def save(figure: Figure, path: str | Path, **options: Any) -> None:
         figure.savefig(temporary, format=kind, **options)
 
 
+def head(figure: Figure, title: str) -> None:
+    """Write what a figure is of above it."""
+    figure.suptitle(title, fontsize="medium")
+
+
 def remark(figure: Figure, text: str) -> None:
     """Write a remark below a figure."""
     if text:

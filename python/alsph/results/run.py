@@ -20,6 +20,7 @@ from alsph.errors import RunFolderError
 from alsph.folder import reading
 from alsph.folder.durable import check_folder
 from alsph.folder.run_folder import RunFolder
+from alsph.parameters import choose
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.loads import Loads
 from alsph.results.outcome import outcome
@@ -159,11 +160,11 @@ class Run(Loads):
 
     def plot_forces(self, path: str | Path | None = None, body: str | None = None) -> Figure:
         """Figure of drag and lift over time with their parts and the averaging window; saved if `path` is given."""
-        return self._saved(_plotting().forces(self, body), path)
+        return self._saved(_plotting().forces(self, body), path, body)
 
     def plot_spectrum(self, path: str | Path | None = None, body: str | None = None) -> Figure:
         """Figure of the spectra of drag and lift in the averaging window; saved if `path` is given."""
-        return self._saved(_plotting().spectrum({in_figure(self.path.name): self}, body), path)
+        return self._saved(_plotting().spectrum({in_figure(self.path.name): self}, body), path, body)
 
     def plot_field(
         self,
@@ -191,7 +192,7 @@ class Run(Loads):
         _plotting().field_style(name)
         snapshot = self.snapshot(time)
         figure = _plotting().field(snapshot, name, self.spacing, limit=limit, view=view, title=self._title)
-        return self._saved(figure, path)
+        return self._saved(figure, path, headed=True)
 
     def animate(self, name: str = "vorticity", path: str | Path | None = None, **options: Any) -> Path:
         """Make a film of a field from the snapshots.
@@ -223,20 +224,25 @@ class Run(Loads):
         return target
 
     def plot_pressure_coefficient(
-        self, path: str | Path | None = None, reference: tuple[FloatArray, FloatArray] | None = None
+        self,
+        path: str | Path | None = None,
+        reference: tuple[FloatArray, FloatArray] | None = None,
+        body: str | None = None,
     ) -> Figure:
         """Figure of C_p and a reference curve (θ in degrees, or x/c, and C_p); saved if `path` is given.
 
-        Without a `reference`, that of :attr:`profiles` is drawn where there is one.
+        It is that of all bodies, if no `body` is named. Without a `reference`, that of :attr:`profiles` is drawn where
+        there is one.
         """
+        coefficient, names = self.pressure_coefficient, self.config.case.surface_bodies
+        if body is not None:
+            choose("body", body, names)
+            coefficient = coefficient.of([part for part, name in enumerate(names) if name == body])
         if reference is None:
-            known = (
-                profile.reference
-                for profile in self.profiles
-                if profile.name == "pressure coefficient" and profile.reference[0].size
-            )
+            title = "pressure coefficient" + f" of {body}" * (len(set(names)) > 1)
+            known = (each.reference for each in self.profiles if each.name == title and each.reference[0].size)
             reference = next(known, None)
-        return self._saved(_plotting().pressure_coefficient(self.pressure_coefficient, reference), path)
+        return self._saved(_plotting().pressure_coefficient(coefficient, reference, names), path, body)
 
     def plot_profile(self, profile: Profile, path: str | Path | None = None) -> Figure:
         """Figure of one of :attr:`profiles` beside its reference; saved if `path` is given."""
@@ -246,7 +252,11 @@ class Run(Loads):
         """Figure of divergence, iterations, time step, volume, mass and energy over time; saved if `path` is given."""
         return self._saved(_plotting().ledger(self), path)
 
-    def _saved(self, figure: Figure, path: str | Path | None) -> Figure:
+    def _saved(
+        self, figure: Figure, path: str | Path | None, body: str | None = None, *, headed: bool = False
+    ) -> Figure:
+        if not headed:
+            _plotting().head(figure, ", ".join(filter(None, (self._title, body and in_figure(body)))))
         _plotting().remark(figure, self._said())
         if path is not None:
             _plotting().save(figure, path)
