@@ -187,3 +187,10 @@ def test_divergence_is_exit_code_1(alsph, tmp_path, small_options):
     assert "last good state" in stderr
     assert "Traceback" not in stderr
     assert "last good state" in alsph("info", tmp_path / "run")[1]
+
+
+def test_help_has_problem_method_and_run_apart(alsph):
+    code, out, _ = alsph("run", "cylinder", "--help")
+    words = "Options:", "--force", "Parameters of the problem:", "--reynolds", "--upstream", "Parameters of the method:"
+    at = [out.index(word) for word in (*words, "--courant", "--wall-pressure", "Settings of the run:", "--until")]
+    assert code == 0 and at == sorted(at)

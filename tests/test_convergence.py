@@ -8,7 +8,7 @@ from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError
 from alsph.study import convergence
 from alsph.study.convergence import converge, grid_convergence
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 
@@ -18,6 +18,7 @@ from hypothesis import strategies as st
     slope=st.floats(0.1, 5.0),
     ratios=st.tuples(st.floats(1.2, 2.5), st.floats(1.2, 2.5)),
 )
+@settings(deadline=None)  # the first one loads scipy
 def test_order_and_limit_of_a_power_law_are_recovered_at_any_ratios(order, limit, slope, ratios):
     resolutions = [10.0, 10 * ratios[0], 10 * ratios[0] * ratios[1]]
     found = grid_convergence("f", resolutions, [limit + slope * (10 / n) ** order for n in resolutions])

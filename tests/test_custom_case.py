@@ -4,10 +4,14 @@ import functools
 import os
 import subprocess
 import sys
+import warnings
 
+import numpy as np
 import pytest
 from alsph import cases, config, open_run
 from alsph.errors import ConfigError
+from alsph.geometry.particles import Kind
+from pydantic import Field
 
 HEATED = '''
 from typing import ClassVar
@@ -282,3 +286,37 @@ def test_measures_that_fail_leave_the_rest_of_the_results(command, tmp_path, mea
     assert done.returncode == 0 and "mean velocity divergence" in done.stdout, done.stderr
     assert "no measures: those of Heated fail, " in done.stdout and told in done.stdout
     assert command("resume", "run", "--until", 0.1, cases=()).returncode == 0
+
+
+class Turning(cases.Couette):
+    """A wall whose particles go their own ways, if its body lets them."""
+
+    keeps: bool = Field(default=False, description="whether the body has no velocity of its own")
+
+    def bodies(self):
+        return [body | ({"velocity": None} if self.keeps else {}) for body in super().bodies()]
+
+    def particles(self):
+        state = super().particles()
+        solid = state["kind"] == Kind.SOLID
+        state["velocity"][solid, 0] = 0.25
+        return state
+
+
+def test_velocities_of_solid_particles_that_are_not_used_are_warned_of():
+    case = Turning(resolution=8)
+    body = case.bodies()[0]
+    with pytest.warns(UserWarning, match=rf"Turning: .*'{body['name']}' are not used.*say None there"):
+        simulation = case.simulation(threads=1)
+    simulation.advance(1)
+    state = simulation.state()
+    lower = (state["kind"] == Kind.SOLID) & (state["body"] == 0)
+    assert np.allclose(state["velocity"][lower], body["velocity"])  # indeed
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        kept = case.replace(keeps=True).simulation(threads=1)
+        for model in (cases.Couette, cases.Cavity, cases.CylinderPair, cases.BackwardFacingStep):
+            model(resolution=10).build()
+    kept.advance(1)
+    state = kept.state()
+    assert np.allclose(state["velocity"][state["kind"] == Kind.SOLID], [0.25, 0.0])

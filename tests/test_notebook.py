@@ -1,6 +1,11 @@
 """A notebook in a kernel of its own: pictures are shown, progress needs nothing, an interrupted run goes on."""
 
+import base64
+import io
+
 import pytest
+from alsph.plotting.animation import MOST_SHOWN, Film
+from PIL import Image
 
 nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
 
@@ -9,6 +14,7 @@ CELLS = {
     "run": "run = case.run('run', until=0.3, output_interval=0.1)",
     "summary": "run",
     "picture": "run.plot_field('vorticity')",
+    "film": "run.animate('vorticity')",
     "interrupted": """
 import _thread, threading
 threading.Timer(4, _thread.interrupt_main).start()
@@ -45,6 +51,28 @@ def test_a_case_and_a_run_are_tables(outputs):
 def test_a_figure_is_shown(outputs):
     (output,) = outputs["picture"]
     assert len(output.data["image/png"]) > 10_000
+
+
+def test_a_film_is_shown(outputs):
+    (output,) = [output for output in outputs["film"] if "data" in output]
+    start = '<img src="data:image/gif;base64,'
+    assert output.data["text/html"].startswith(start)
+    film = base64.b64decode(output.data["text/html"].removeprefix(start).partition('"')[0])
+    assert film.startswith(b"GIF89a") and Image.open(io.BytesIO(film)).n_frames == 4
+
+
+def test_the_path_of_a_film_is_a_path(tmp_path):
+    film = Film(tmp_path / "film.gif")
+    assert film == tmp_path / "film.gif" and film._repr_html_() is None  # not made yet
+    film.write_bytes(b"GIF89a")
+    assert "data:image/gif" in film._repr_html_()
+    assert film.with_suffix(".txt")._repr_html_() is None and film.parent._repr_html_() is None
+    with film.open("wb") as file:
+        file.truncate(MOST_SHOWN + 1)
+    assert film._repr_html_() is None
+    video = Film(tmp_path / "film.mp4")
+    video.write_bytes(b"video")
+    assert video._repr_html_().startswith("<video controls")
 
 
 def test_progress_is_a_line_that_changes(outputs):

@@ -197,3 +197,9 @@ def test_a_study_may_draw_the_pressure_coefficient_of_bodies():
     assert "pressure coefficient" in names(Config(Body(resolution=10)))[1]
     assert "pressure coefficient" in names(Config(Cylinder(reynolds=150)))[1]
     assert "pressure coefficient of body_2" in names(Config(CylinderPair(resolution=10)))[1]
+
+
+def test_pictures_of_several_runs_tell_the_time_of_each(run):
+    pictures = {"one": (run.snapshot(10), run.spacing), "other": (run.snapshot(30), run.spacing)}
+    titles = [axes.get_title() for axes in plotting.fields(pictures, ["vorticity"]).axes if axes.get_title()]
+    assert titles == ["one, $tU/D$ = 10.00", "other, $tU/D$ = 30.00"]

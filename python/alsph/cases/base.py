@@ -388,13 +388,29 @@ class Case(Method):
         threads
             Number of threads that it will be solved with, which need memory; all cores if None.
 
+        Warns
+        -----
+        UserWarning
+            If solid particles have velocities that are not used, because their body has another one.
+
         Raises
         ------
         ConfigError
             If the particles would not fit into the memory that is free.
         """
         self.check_memory(threads)
-        return self.problem(self.particles())
+        state = self.particles()
+        self._warn_of_unused_velocities(state)
+        return self.problem(state)
+
+    def _warn_of_unused_velocities(self, state: dict[str, NDArray[Any]]) -> None:
+        """Warn if solid particles have velocities that are not those of their body, which are the ones that hold."""
+        for index, body in enumerate(self.settings()["bodies"]):
+            own = state["velocity"][(state["kind"] == Kind.SOLID) & (state["body"] == index)]
+            if body["velocity"] is not None and own.any() and not np.allclose(own, body["velocity"]):
+                told = f"velocities that particles() gives to those of '{body['name']}' are not used"
+                why = f"bodies() says velocity = {body['velocity']}; say None there to keep them"
+                warnings.warn(f"{type(self).__name__}: the {told}, as {why}", stacklevel=3)
 
     def check_memory(self, threads: int | None = None) -> None:
         """Refuse what would not fit into the memory that is free, as :meth:`build` does."""

@@ -4,15 +4,16 @@ import functools
 import inspect
 import re
 import types
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
 from alsph import cases, config
+from alsph.cases.method import Method
 from alsph.cli.terminal import exit_codes
 from alsph.config import RunSettings
 from alsph.errors import ConfigError
@@ -41,7 +42,7 @@ Threads = Annotated[int | None, typer.Option(help="number of threads", show_defa
 
 WORDS = {int: "a whole number", float: "a number"}
 
-METAVARS = {int: "INTEGER", float: "FLOAT"}
+METAVARS: dict[Any, str] = {int: "INTEGER", float: "FLOAT", list[str]: "TEXT"}
 
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="run folder")]
 
@@ -50,9 +51,10 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
     """Return a command for a case: `action` called with the configuration that the options make."""
     own = list(inspect.signature(action).parameters.values())[1:]
     taken = {parameter.name for parameter in own} | RunSettings.model_fields.keys() | {"context", "case", "run"}
-    if names := sorted(taken & model.model_fields.keys()):
+    names = model.parameter_names()
+    if clashes := sorted(taken & model.model_fields.keys()):
         raise ConfigError(
-            f"{model.__name__}: its parameter '{names[0]}' has the name of an option; give it another one"
+            f"{model.__name__}: its parameter '{clashes[0]}' has the name of an option; give it another one"
         )
     try:
         until = f"{model().default_until:g}"
@@ -76,8 +78,9 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
     parameters = [
         first,
         *keywords,
-        *_options(model, model.parameter_names(), {}),
-        *_options(RunSettings, RunSettings.model_fields, {"until": until, "threads": "all cores"}),
+        *_options("Parameters of the problem", model, [name for name in names if name not in Method.model_fields]),
+        *_options("Parameters of the method", model, [name for name in names if name in Method.model_fields]),
+        *_options("Settings of the run", RunSettings, RunSettings.model_fields, until=until, threads="all cores"),
     ]
     functools.update_wrapper(command, action)
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
@@ -105,7 +108,9 @@ class CaseGroup(TyperGroup):
             model = type(ctx.obj.case) if ctx.obj else cases.find(cmd_name)
             app = typer.Typer(add_completion=False, rich_markup_mode=None)
             text = re.sub(r":\w+:`([^`]*)`", r"\1", (model.__doc__ or "").split("Parameters\n---")[0].strip())
-            app.command(model.name, help=text, short_help=model.title)(_case_command(model, self.action))
+            app.command(model.name, cls=CaseCommand, help=text, short_help=model.title)(
+                _case_command(model, self.action)
+            )
             return get_command(app)
         raise AssertionError("the block ends in one way or the other")
 
@@ -115,7 +120,23 @@ def group_of_cases(action: Callable[..., None]) -> type[CaseGroup]:
     return type("Cases", (CaseGroup,), {"action": staticmethod(action)})
 
 
-def _options(model: type[Parameters], names: Iterable[str], defaults: Mapping[str, str]) -> Iterator[inspect.Parameter]:
+class CaseCommand(TyperCommand):
+    """A command whose help has its options in the sections that they name."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the options."""
+        sections: dict[str, list[Any]] = {}
+        for option in self.get_params(ctx):
+            if record := option.get_help_record(ctx):
+                sections.setdefault(getattr(option, "rich_help_panel", None) or "Options", []).append(record)
+        for name, records in sections.items():
+            with formatter.section(name):
+                formatter.write_dl(records)
+
+
+def _options(
+    section: str, model: type[Parameters], names: Iterable[str], **defaults: str
+) -> Iterator[inspect.Parameter]:
     """Make an option of each named field of a model; `defaults` says what stands for None."""
     for name in names:
         kind, choices = _option_type(model.model_fields[name].annotation)
@@ -124,7 +145,8 @@ def _options(model: type[Parameters], names: Iterable[str], defaults: Mapping[st
             f"{flag}/--no-{flag[2:]}" if kind is bool else flag,
             help=f"{model.describe(name)}  [default: {defaults.get(name) or describe_default(model, name)}]",
             show_default=False,
-            metavar="|".join(map(str, choices)) or METAVARS.get(kind) or ("TEXT" if kind == list[str] else None),
+            rich_help_panel=section,
+            metavar="|".join(map(str, choices)) or METAVARS.get(kind),
             parser=_choice_of(choices) if choices else _number_of(kind) if kind in WORDS else None,
         )
         yield inspect.Parameter(

@@ -122,15 +122,15 @@ def _plot(
     """
     choose("format", kind, KINDS)
     run = Run(path)
-    field = field or ([] if run.case.get("dimensions") == 3 else ["vorticity", "pressure"])
-    for name in field:
+    names: list[Any] = field or ([] if run.case.get("dimensions") == 3 else ["vorticity", "pressure"])
+    for name in names:
         plotting.field_style(name)
     figures = output or path / "figures"
-    drawings = _drawings(run, body or []) | {name: functools.partial(run.plot_field, name, time) for name in field}
+    drawings = _drawings(run, body or []) | {name: functools.partial(run.plot_field, name, time) for name in names}
     if not output:
         check_folder(figures)
     figures.mkdir(parents=True, exist_ok=True)
-    if time is not None and field:
+    if time is not None and names:
         complain(f"fields at t* = {run.snapshot(time).time:.6g}, the output nearest to {time:g}")
     for name, draw in drawings.items():
         plotting.save(draw(), figures / f"{name}.{kind}", dpi=dpi)
@@ -177,7 +177,8 @@ def _animate(
     A run writes a snapshot every output_interval. MP4 and WebM need pip install 'alsph[video]'.
     """
     run = Run(path)
-    times = {name: value for name, value in (("start", start), ("end", end)) if value is not None}
+    name: Any = field
+    times = {what: value for what, value in (("start", start), ("end", end)) if value is not None}
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("pictures", total=None)
@@ -185,7 +186,7 @@ def _animate(
         def progress(done: int, count: int) -> None:
             bar.update(task, completed=done, total=count)
 
-        film = run.animate(field, output, every=every, fps=fps, limit=limit, progress=progress, **times)
+        film = run.animate(name, output, every=every, fps=fps, limit=limit, progress=progress, **times)
     say(film)
 
 

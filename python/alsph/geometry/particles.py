@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,10 @@ from alsph.arrays import FloatArray
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
+
+
+Field = Literal["vorticity", "pressure", "velocity", "velocity_divergence"]
+"""A field of particles that is drawn."""
 
 
 class Kind(IntEnum):

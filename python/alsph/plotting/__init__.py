@@ -1,6 +1,6 @@
 """Figures of runs and of their fields, as pure functions: results in, :class:`matplotlib.figure.Figure` out."""
 
-from alsph.plotting.animation import animate
+from alsph.plotting.animation import Film, animate
 from alsph.plotting.curves import Curve, convergence, panels, pressure_coefficient, profile
 from alsph.plotting.histories import coefficients, forces, ledger, spectrum
 from alsph.plotting.pictures import FIELDS, field, field_style, fields
@@ -9,6 +9,7 @@ from alsph.plotting.style import head, remark, save
 __all__ = [
     "FIELDS",
     "Curve",
+    "Film",
     "animate",
     "coefficients",
     "convergence",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import itertools
 import warnings
 from collections.abc import Callable, Iterator
@@ -25,8 +26,24 @@ Frame = NDArray[np.uint8]
 
 GIF, VIDEO = ".gif", (".mp4", ".webm")
 DPI = 100
+MOST_SHOWN = 30 * 2**20
+"""Bytes of a film up to which a notebook shows it in itself."""
+
 SCALED_BY = 5
 """Number of snapshots, evenly over the film, that the colour scale is made for."""
+
+
+class Film(type(Path())):  # type: ignore[misc]
+    """The path of a film, which a notebook shows where it ends a cell, if it is not very large."""
+
+    def _repr_html_(self) -> str | None:
+        kind = self.suffix.lower()
+        if kind not in (GIF, *VIDEO) or not self.is_file() or self.stat().st_size > MOST_SHOWN:
+            return None
+        data = base64.b64encode(self.read_bytes()).decode()
+        if kind == GIF:
+            return f'<img src="data:image/gif;base64,{data}">'
+        return f'<video controls loop src="data:video/{kind[1:]};base64,{data}"></video>'
 
 
 def animate(

@@ -20,6 +20,7 @@ from alsph.errors import RunFolderError
 from alsph.folder import reading
 from alsph.folder.durable import check_folder
 from alsph.folder.run_folder import RunFolder
+from alsph.geometry.particles import Field
 from alsph.parameters import choose
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.loads import Loads
@@ -168,7 +169,7 @@ class Run(Loads):
 
     def plot_field(
         self,
-        name: str,
+        name: Field,
         time: float | None = None,
         path: str | Path | None = None,
         *,
@@ -194,7 +195,7 @@ class Run(Loads):
         figure = _plotting().field(snapshot, name, self.spacing, limit=limit, view=view, title=self._title)
         return self._saved(figure, path, headed=True)
 
-    def animate(self, name: str = "vorticity", path: str | Path | None = None, **options: Any) -> Path:
+    def animate(self, name: Field = "vorticity", path: str | Path | None = None, **options: Any) -> Path:
         """Make a film of a field from the snapshots.
 
         Parameters
@@ -210,7 +211,7 @@ class Run(Loads):
         Returns
         -------
         Path
-            The file.
+            The file, which a notebook shows as a film.
 
         Raises
         ------
@@ -219,7 +220,7 @@ class Run(Loads):
         """
         if path is None:
             check_folder(self.path / "figures")
-        target = Path(path) if path is not None else self.path / "figures" / f"{name}.gif"
+        target: Path = _plotting().Film(path if path is not None else self.path / "figures" / f"{name}.gif")
         _plotting().animate(self, name, target, title=self._title, said=self._said(), **options)
         return target
 
