@@ -359,7 +359,7 @@ def test_body_refuses_to_touch_the_sides(tmp_path):
 
 def test_wide_domain_of_the_cylinder_is_possible():
     case = Cylinder(height=60.0, upstream=30.0, length=90.0, resolution=8)
-    assert case.domain()["upper"] == [90, 30]
+    assert case.domain().upper == (90, 30)
     assert case.particle_estimate() == pytest.approx(90 * 60 * 64, rel=0.05)
 
 

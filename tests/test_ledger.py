@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from alsph import Run
-from alsph.cases import Cylinder, TaylorGreen
+from alsph.cases import Cylinder, SolidBody, TaylorGreen
 from alsph.config import Config, RunSettings
 from alsph.folder.run_folder import RunFolder
 from synthetic import history, write_run
@@ -55,7 +55,7 @@ def test_work_of_the_body_force_and_of_moving_walls(tmp_path, monkeypatch):
     for part, force in (("pressure", 0.0), ("viscous", -0.3)):
         run.history[f"lid_{part}_force_x"], run.history[f"lid_{part}_force_y"] = np.full((2, steps), force)
     still = run.ledger
-    monkeypatch.setattr(TaylorGreen, "bodies", lambda self: [{"name": "lid", "velocity": [2.0, 0.0]}])
+    monkeypatch.setattr(TaylorGreen, "bodies", lambda self: [SolidBody("lid", (0, 0), (2, 0))])
     monkeypatch.setattr(TaylorGreen, "body_force", lambda self: [1.0, 0.0])
     snapshot = Run.snapshot
 
@@ -65,7 +65,7 @@ def test_work_of_the_body_force_and_of_moving_walls(tmp_path, monkeypatch):
         return found
 
     monkeypatch.setattr(Run, "snapshot", moving)
-    del run.ledger
+    del run.ledger, run.config
     assert run.ledger.power == pytest.approx(2.0 * 0.3 + 0.5 * 1.0, rel=1e-3)
     assert run.ledger.dissipation == pytest.approx(still.dissipation, rel=1e-3)
     assert run.ledger.imbalance == pytest.approx(still.imbalance - run.ledger.power, abs=1e-3)

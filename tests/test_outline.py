@@ -349,7 +349,7 @@ def test_shapes_made_in_python_are_bodies_that_run_resume_and_repeat(tmp_path):
     pair = Body(shape=shapely.MultiPolygon(polygons))
     assert pair == pair.replace(shape=polygons) == pair.replace(shape=[ELLIPSE, ELLIPSE + [0, 1]])
     assert Body(shape=[ELLIPSE, ELLIPSE[::2] + [0, 1]]).shape.polygons[1].area > 0
-    assert [body["name"] for body in pair.bodies()] == ["body_1", "body_2"]
+    assert [body.name for body in pair.bodies()] == ["body_1", "body_2"]
 
 
 @pytest.mark.parametrize(

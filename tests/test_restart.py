@@ -9,7 +9,7 @@ import alsph
 import numpy as np
 import pytest
 from alsph import config
-from alsph.cases import CASES, BackwardFacingStep, Cylinder, TaylorGreen
+from alsph.cases import CASES, BackwardFacingStep, Cylinder, Domain, TaylorGreen
 from alsph.config import Config, RunSettings
 from alsph.engine.prescribed import Prescription, backflow, difference, fingerprint
 from alsph.errors import ConfigError, RunFolderError, SolverError
@@ -363,12 +363,12 @@ def test_a_breakdown_after_backflow_tells_of_it(small):
 
 def test_backflow_is_judged_at_each_inlet():
     """Two inlets that face each other, and a domain without any."""
-    domain = {"lower": [0.0, -1.0], "upper": [2.0, 1.0], "boundaries": [["inlet", "inlet"], ["outlet", "outlet"]]}
+    domain = Domain((0, -1), (2, 1), [("inlet", "inlet"), ("outlet", "outlet")])
     position = np.array([[-0.1, 0.0], [2.1, 0.0]])
     assert backflow(domain, position, np.array([[1.0, 0.0], [-1.0, 0.0]]), 0.0) == ""
     with pytest.raises(ConfigError, match="inlet x = 2 "):
         backflow(domain, position, np.array([[1.0, 0.0], [1.0, 0.0]]), 0.0)
-    assert backflow(domain | {"boundaries": [["slip"] * 2] * 2}, position, -position, 0.0) == ""
+    assert backflow(Domain((0, -1), (2, 1), [("slip", "slip")] * 2), position, -position, 0.0) == ""
     assert backflow(domain, position, 0 * position, 0.0) == ""
 
 

@@ -199,7 +199,7 @@ def test_mistyped_names_are_refused_with_what_there_is(tmp_path, small):
         (lambda: run.plot_field("pressure", limit="high"), "limit = 'high': must be a number above zero"),
         (lambda: run.snapshot("late"), "time = 'late': must be a finite number"),
         (lambda: run.snapshot([1.0]), r"time = \[1.0\]: must be a finite number"),
-        (lambda: run.momentum_balance((1, -1, 0), (3, 1, 1)), "needs corners of 2 numbers"),
+        (lambda: run.momentum_balance((1, -1, 0), (3, 1, 1)), "needs corners of 2 finite numbers"),
         (lambda: run.momentum_balance((3, -1), (1, 1)), "the lower one first"),
     ):
         with pytest.raises(ConfigError, match=message):
@@ -258,7 +258,7 @@ def test_loads_are_those_of_all_bodies_together_or_of_the_first_wall(tmp_path):
         assert run.coefficient("x", "pressure") == pytest.approx(share * drag)
         assert run.coefficient("y", "pressure", names[1]) == pytest.approx(3 * lift)
         if share == 4:  # lifts that act a distance before the point put the nose up
-            behind = np.add(case.bodies()[0]["center"], (1.5, 0))
+            behind = np.add(case.bodies()[0].center, (1.5, 0))
             assert run.moment_coefficient("pressure", about=behind) == pytest.approx(1.5 * share * lift / 2**2)
 
 
@@ -344,7 +344,7 @@ def test_the_momentum_balance_is_of_the_snapshots_in_the_window(folder):
 def test_points_and_boxes_that_are_none_are_refused(folder):
     run = Run(folder)
     for lower, upper in (((1, 2), (1, 3)), ((1, 2), (3, 2)), ((1, 2, 3), (2, 3, 4)), ((1, 2), (2, 3, 4))):
-        with pytest.raises(ConfigError, match="needs corners of 2 numbers, the lower one first"):
+        with pytest.raises(ConfigError, match="needs corners of 2 finite numbers, the lower one first"):
             run.momentum_balance(lower, upper)
     assert run.snapshot(26).time == 30 and run.snapshot(24).time == 20 and run.snapshot(-5.0).time == 0
     for time in (math.nan, math.inf, "1"):

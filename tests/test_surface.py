@@ -182,7 +182,7 @@ def test_moments_about_any_point(tmp_path):
     with pytest.raises(ConfigError, match="body = 'other': unknown; known: body"):
         run.moment(body="other")
     for point in ((1, 2, 3), (1,), 1.0, "x", (0, float("nan"))):
-        with pytest.raises(ConfigError, match="about = .*: must be two numbers"):
+        with pytest.raises(ConfigError, match="about = .*: must be two finite numbers"):
             run.moment(about=point)
 
 

@@ -134,7 +134,7 @@ def test_fluid_stays_within_a_channel_that_the_body_nearly_fills(length):
     case = Body(resolution=8, length=length, height=2.0, upstream=1.0)
     state = case.particles()
     fluid = state["position"][state["kind"] == Kind.FLUID]
-    lower, upper = np.array(case.domain()["lower"]), np.array(case.domain()["upper"])
+    lower, upper = np.array(case.domain().lower), np.array(case.domain().upper)
     assert np.minimum(fluid - lower, upper - fluid).min() > 0.4 / case.resolution
     assert KDTree(fluid).query(fluid, 2)[0][:, 1].min() > 0.75 / case.resolution
 

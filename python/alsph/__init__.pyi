@@ -16,6 +16,7 @@ from . import (
     study,
 )
 from .engine.simulation import Simulation
+from .geometry.domain import Domain, SolidBody
 from .results.run import Run, open_run
 from .running.repetition import repeat
 from .running.start import resume
@@ -28,8 +29,10 @@ __version__: str
 
 __all__ = [
     "Comparison",
+    "Domain",
     "Run",
     "Simulation",
+    "SolidBody",
     "__version__",
     "autotune",
     "cases",

@@ -108,11 +108,10 @@ class Config:
             If they are no points of the domain.
         """
         found = points(self.run.probes or [], self.case.space_dimensions)
-        domain = self.case.domain()
-        for point in found:
-            if not (np.all(point >= domain["lower"]) and np.all(point <= domain["upper"])):
-                box = f"{domain['lower']} to {domain['upper']} [D]"
-                raise ConfigError(f"run.probes: {point.tolist()} lies outside of the domain, {box}")
+        domain = self.case.checked_domain
+        for point in found[~domain.contains(found)]:
+            box = f"{list(domain.lower)} to {list(domain.upper)} [D]"
+            raise ConfigError(f"run.probes: {point.tolist()} lies outside of the domain, {box}")
         return found
 
     def tables(self) -> dict[str, Any]:

@@ -3,13 +3,12 @@
 import difflib
 import html
 import inspect
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any, NoReturn, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from alsph.arrays import FloatArray
 from alsph.errors import ConfigError
 from alsph.text import shown
 
@@ -182,14 +181,3 @@ def _mistake(model: type[Parameters], mistake: Any) -> str:
         words += f", as {value:.0f}"
     typed = shown(value, LONGEST_PATH) if isinstance(value, str) else shown(value)
     return f"{name} = {typed}: {words} ({model.describe(str(mistake['loc'][0]))})"
-
-
-def checked_point(name: str, value: Sequence[float]) -> FloatArray:
-    """Return a point (2,) that was given by its two coordinates."""
-    try:
-        point = np.array(value, float)
-    except (TypeError, ValueError):
-        point = np.empty(0)
-    if point.shape != (2,) or not np.isfinite(point).all():
-        raise ConfigError(f"{name} = {shown(value)}: must be two numbers, x and y [D]")
-    return point

@@ -8,6 +8,7 @@ import numpy as np
 
 from alsph.arrays import FloatArray
 from alsph.errors import ConfigError
+from alsph.geometry.points import checked_point
 from alsph.text import shown
 
 MOST_POINTS = 10_000
@@ -69,11 +70,4 @@ def _line(text: str, dimensions: int) -> FloatArray:
 
 
 def _numbers(words: Sequence[object], dimensions: int, text: str = "") -> FloatArray:
-    try:
-        numbers = np.array(words, float)
-    except (TypeError, ValueError):
-        numbers = np.empty(0)
-    if numbers.shape != (dimensions,) or not np.isfinite(numbers).all():
-        what = "two numbers, X,Y" if dimensions == 2 else "three numbers, X,Y,Z"
-        raise ConfigError(f"run.probes: {shown(text or words)} is no point, which is {what} [D]")
-    return numbers
+    return checked_point("run.probes", words, dimensions, text)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.errors import ConfigError
+from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Kind, Snapshot, neighbour_tree
 
 NEIGHBOURS_PER_DIMENSION = 8
@@ -52,39 +53,21 @@ def in_solid(snapshot: Snapshot, points: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(~snapshot.fluid[nearest])
 
 
-def checked_points(points: ArrayLike, dimensions: int) -> FloatArray:
-    """Return points (m, d).
-
-    Raises
-    ------
-    ConfigError
-        If they are none.
-    """
-    try:
-        found = np.atleast_2d(np.asarray(points, float))
-    except (TypeError, ValueError):
-        found = np.empty(0)
-    if found.ndim != 2 or found.shape[1] != dimensions or not np.isfinite(found).all():
-        raise ConfigError(f"points: must be points of {dimensions} finite numbers, an array (m, {dimensions}) [D]")
-    return found
-
-
-def at(snapshot: Snapshot, points: FloatArray, spacing: float, domain: Mapping[str, Any]) -> dict[str, FloatArray]:
+def at(snapshot: Snapshot, points: FloatArray, spacing: float, domain: Domain) -> dict[str, FloatArray]:
     """Return velocity and pressure of the fluid of a snapshot, and their gradients, at points (m, d) of a domain.
 
     See :meth:`alsph.Run.sample`.
     """
     fluid = snapshot.fluid
     fields = np.column_stack([snapshot.velocity[fluid], snapshot.pressure[fluid]])
-    lower, upper = np.array(domain["lower"]), np.array(domain["upper"])
-    periodic = np.array(["periodic" in pair for pair in domain["boundaries"]])
-    points = np.where(periodic, lower + (points - lower) % (upper - lower), points)
-    position, fields = _with_images(snapshot.position[fluid], fields, lower, upper, periodic, REACH * spacing)
+    lower = np.array(domain.lower)
+    points = np.where(domain.periodic, lower + (points - lower) % domain.size, points)
+    position, fields = with_images(snapshot.position[fluid], fields, domain, REACH * spacing)
     parts = [points[first : first + CHUNK] for first in range(0, max(len(points), 1), CHUNK)]
     found = [interpolate(position, fields, part, spacing) for part in parts]
     values, gradients = (np.concatenate(each) for each in zip(*found, strict=True))
-    outside = (points < lower - 1e-9 * spacing) | (points > upper + 1e-9 * spacing)
-    void = outside.any(axis=1) | (neighbour_tree(position).query(points)[0] > VOID * spacing)
+    outside = ~domain.contains(points, 1e-9 * spacing)
+    void = outside | (neighbour_tree(position).query(points)[0] > VOID * spacing)
     values[void], gradients[void] = np.nan, np.nan
     return {
         "velocity": values[:, :-1],
@@ -94,15 +77,14 @@ def at(snapshot: Snapshot, points: FloatArray, spacing: float, domain: Mapping[s
     }
 
 
-def _with_images(
-    position: FloatArray, fields: FloatArray, lower: FloatArray, upper: FloatArray, periodic: FloatArray, reach: float
+def with_images(
+    position: FloatArray, fields: FloatArray, domain: Domain, reach: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return particles with the images of those near the periodic sides of a box."""
-    for axis in np.flatnonzero(periodic):
-        shift = np.zeros_like(lower)
-        shift[axis] = upper[axis] - lower[axis]
+    """Return particles with the images of those at most `reach` away from the periodic sides of a domain."""
+    for axis in np.flatnonzero(domain.periodic).tolist():
+        shift = np.eye(domain.dimensions)[axis] * domain.size[axis]
         along = position[:, axis]
-        near = [along < lower[axis] + reach, along > upper[axis] - reach]
+        near = [along < domain.lower[axis] + reach, along > domain.upper[axis] - reach]
         position = np.concatenate([position, position[near[0]] + shift, position[near[1]] - shift])
         fields = np.concatenate([fields, fields[near[0]], fields[near[1]]])
     return position, fields

@@ -29,6 +29,7 @@ from alsph.cases.pressure_jump import PressureJump
 from alsph.cases.pulsating_channel import PulsatingChannel
 from alsph.cases.taylor_green import TaylorGreen
 from alsph.errors import ConfigError
+from alsph.geometry.domain import Domain, SolidBody
 from alsph.parameters import suggest
 
 CASES: dict[str, type[Case]] = {
@@ -50,9 +51,11 @@ __all__ = [
     "Couette",
     "Cylinder",
     "CylinderPair",
+    "Domain",
     "Poiseuille",
     "PressureJump",
     "PulsatingChannel",
+    "SolidBody",
     "TaylorGreen",
     "find",
 ]

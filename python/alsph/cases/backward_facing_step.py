@@ -16,6 +16,7 @@ from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
+from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, cells, inside, lattice
 from alsph.geometry.particles import Kind, join, particles
 from alsph.geometry.solids import walls
@@ -67,17 +68,14 @@ class BackwardFacingStep(Case):
         """Kinematic viscosity ν [UD], from Re = 2hU/ν."""
         return 2.0 * self.inlet_height / self.reynolds
 
-    def domain(self) -> dict[str, Any]:
+    def domain(self) -> Domain:
         """Return the bounds of the channel: inlet and outlet; solid particles close the rest."""
-        return {
-            "lower": [-self.upstream, 0.0],
-            "upper": [self.downstream, 1.0 + self.inlet_height],
-            "boundaries": [["inlet", "outlet"], ["none", "none"]],
-        }
+        top = 1.0 + self.inlet_height
+        return Domain((-self.upstream, 0), (self.downstream, top), [("inlet", "outlet"), ("none", "none")])
 
-    def bodies(self) -> list[dict[str, Any]]:
+    def bodies(self) -> list[SolidBody]:
         """Return the walls, at rest."""
-        return [{"name": "walls", "velocity": [0.0, 0.0], "moves": False, "center": [0.0, 0.0]}]
+        return [SolidBody("walls", (0, 0))]
 
     def particle_estimate(self) -> int:
         """Return about how many particles there are, solid and buffers included."""

@@ -21,11 +21,12 @@ from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.method import Method
 from alsph.engine.output import Output
-from alsph.engine.prescribed import Rule, asked, inlets
+from alsph.engine.prescribed import Rule, asked
 from alsph.engine.problem import Problem
 from alsph.engine.simulation import Simulation, bytes_per_particle, time_step_limits
 from alsph.errors import ConfigError
 from alsph.expressions import VectorExpression
+from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
 from alsph.memory import check
@@ -96,9 +97,9 @@ class Case(Method):
             method = next(method for method, parameter in RULES.items() if parameter == name)
             if self._overrides(method):
                 raise ConfigError(f"{name}: {type(self).__name__} says that itself, by its method `{method}`")
-        if self.inlet_velocity is not None and not any(inlets(self.domain())):
+        if self.inlet_velocity is not None and not any(self.checked_domain.inlets()):
             raise ConfigError(f"inlet_velocity = {shown(self.inlet_velocity)}: {self.name} has no inlet")
-        if self.surface_velocity is not None and all(body["moves"] for body in self.bodies()):
+        if self.surface_velocity is not None and all(body.moves for body in self.checked_bodies):
             raise ConfigError(f"surface_velocity = {shown(self.surface_velocity)}: {self.name} has no body in place")
         return self
 
@@ -123,9 +124,9 @@ class Case(Method):
         return code.model_dump() if code else cls.name
 
     @property
-    @abstractmethod
     def default_until(self) -> float:
-        """End time of a run that is given none [D/U]."""
+        """End time of a run that is given none [D/U]: by default twice the longest side of the domain over U."""
+        return 2.0 * max(self.checked_domain.size)
 
     @property
     def space_dimensions(self) -> int:
@@ -154,20 +155,44 @@ class Case(Method):
         return [0.0] * self.space_dimensions
 
     @abstractmethod
-    def domain(self) -> dict[str, Any]:
-        """Return ``lower``, ``upper`` and ``boundaries`` of the domain."""
+    def domain(self) -> Domain:
+        """Return the domain and what closes its sides."""
 
     @abstractmethod
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return the particles at the start."""
 
-    @abstractmethod
     def particle_estimate(self) -> int:
-        """Return about how many particles :meth:`particles` makes, without making them."""
+        """Return about how many particles :meth:`particles` makes, without making them.
 
-    def bodies(self) -> list[dict[str, Any]]:
+        By default, those that fill the domain, the buffers of its inlets and outlets, and walls beyond sides that
+        nothing else closes.
+        """
+        beyond = {"inlet": self.buffer_columns, "outlet": self.buffer_columns, "none": self.support_layers}
+        domain = self.checked_domain
+        columns = [
+            length / self.particle_spacing + sum(beyond.get(side, 0) for side in sides)
+            for length, sides in zip(domain.size, domain.boundaries, strict=True)
+        ]
+        return round(math.prod(columns))
+
+    def bodies(self) -> list[SolidBody]:
         """Return the solid bodies."""
         return []
+
+    @cached_property
+    def checked_domain(self) -> Domain:
+        """What :meth:`domain` gives, which in older cases is a table."""
+        domain = Domain.of(self.domain())
+        if domain.dimensions != self.space_dimensions:
+            told = f"its domain is in {domain.dimensions}-D and the case in {self.space_dimensions}-D"
+            raise ConfigError(f"{self.name}: {told}; correct `domain` or `space_dimensions`")
+        return domain
+
+    @cached_property
+    def checked_bodies(self) -> list[SolidBody]:
+        """What :meth:`bodies` gives, which in older cases are tables."""
+        return [SolidBody.of(body) for body in self.bodies()]
 
     @property
     def coefficient_bodies(self) -> list[str]:
@@ -304,8 +329,8 @@ class Case(Method):
     @property
     def moment_point(self) -> FloatArray:
         """Point (2,) that moments are taken about if no other is given [D]: the centre of the first body."""
-        centres = [body["center"] for body in self.bodies()] or [[np.nan, np.nan]]
-        return np.array(centres[0], float)
+        centres = [body.center for body in self.checked_bodies] or [(np.nan, np.nan)]
+        return np.array(centres[0])
 
     def fluid_volume(self) -> float:
         """Return the volume of the space that the fluid fills [D^d]: that of the cells it is put in at first."""
@@ -373,10 +398,10 @@ class Case(Method):
             "kinematic_viscosity": self.kinematic_viscosity,
             "body_force": self.body_force(),
             "time_step": self.largest_time_step * self.particle_spacing,
-            "domain": self.domain(),
+            "domain": self.checked_domain.settings(),
             "bodies": [
-                body | ({"velocity": None} if "sliding" in self.rules and not body["moves"] else {})
-                for body in self.bodies()
+                body.settings() | ({"velocity": None} if "sliding" in self.rules and not body.moves else {})
+                for body in self.checked_bodies
             ],
         }
 

@@ -17,6 +17,7 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.base import Case
+from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, cells, lattice
 from alsph.geometry.particles import Kind, join, particles
 from alsph.geometry.solids import Solid, walls
@@ -69,30 +70,25 @@ class Cavity(Case):
         """As in the flow past a cylinder of the cavity's size: the vortex in it fills it [D]."""
         return remarks.LAYER * math.sqrt(self.kinematic_viscosity)
 
-    def domain(self) -> dict[str, Any]:
+    def domain(self) -> Domain:
         """Return the cavity; solid particles close all sides."""
-        return {"lower": [0.0, 0.0], "upper": [1.0, 1.0], "boundaries": [["none", "none"]] * 2}
+        return Domain((0, 0), (1, 1), [("none", "none")] * 2)
 
-    def bodies(self) -> list[dict[str, Any]]:
+    def bodies(self) -> list[SolidBody]:
         """Return the walls at rest, and the lid.
 
         The lid reaches over both corners. A lid between resting corners tears away from one of them, which sucks fluid
         into the wall.
         """
-        about = {"center": [0.5, 0.5]}
-        lid = {"name": "lid", "velocity": [1.0, 0.0]} | about
-        slides = {"moves": True, "belt": self._belt} if self.lid == "slides" else {"moves": False}
-        return [{"name": "walls", "velocity": [0.0, 0.0], "moves": False} | about, lid | slides]
+        slides = self.lid == "slides"
+        lid = SolidBody("lid", (0.5, 0.5), (1, 0), moves=slides, belt=self._belt if slides else None)
+        return [SolidBody("walls", (0.5, 0.5)), lid]
 
     @property
     def _belt(self) -> list[float]:
         """Where the lid begins and ends, a layer farther than the fluid sees [D]."""
         beyond = (self.support_layers + 1) * self.particle_spacing
         return [-beyond, 1 + beyond]
-
-    def particle_estimate(self) -> int:
-        """Return about how many particles there are, without the walls' outer corners."""
-        return self.resolution**2 + 4 * self.support_layers * (self.resolution + self.support_layers)
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a lattice of fluid at rest and the solid particles around it."""

@@ -15,6 +15,7 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.base import Case
+from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, lattice, symmetric_centres
 from alsph.geometry.particles import Kind, join, particles
 from alsph.geometry.solids import Solid
@@ -115,22 +116,14 @@ class Channel(Case):
         """Centre of the body (2,) [D]."""
         return np.array([self.upstream, 0.0])
 
-    def domain(self) -> dict[str, Any]:
+    def domain(self) -> Domain:
         """Return the channel: inlet at x = 0, outlet at x = length, free-slip walls at y = ± height/2."""
-        return {
-            "lower": [0.0, -self.height / 2],
-            "upper": [self.length, self.height / 2],
-            "boundaries": [["inlet", "outlet"], ["slip", "slip"]],
-        }
+        half = self.height / 2
+        return Domain((0, -half), (self.length, half), [("inlet", "outlet"), ("slip", "slip")])
 
-    def bodies(self) -> list[dict[str, Any]]:
+    def bodies(self) -> list[SolidBody]:
         """Return the bodies, at rest; their torques are about the centre."""
-        at_rest = {"velocity": [0.0, 0.0], "moves": False, "center": [self.upstream, 0.0]}
-        return [{"name": name} | at_rest for name in self.coefficient_bodies]
-
-    def particle_estimate(self) -> int:
-        """Return about how many particles there are, solid and buffers included."""
-        return round((self.length * self.resolution + 2 * self.buffer_columns) * self.height * self.resolution)
+        return [SolidBody(name, (self.upstream, 0)) for name in self.coefficient_bodies]
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a uniform lattice around the body's solid particles, impulsively started."""

@@ -15,6 +15,7 @@ from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
+from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cells
 from alsph.geometry.particles import Kind, join, particles
 from alsph.geometry.solids import walls
@@ -65,21 +66,14 @@ class Plates(Case):
         """
         return {"velocity": self.profile(position[:, 1], time)[:, None] * [1.0, 0.0]}
 
-    def domain(self) -> dict[str, Any]:
+    def domain(self) -> Domain:
         """Return one period; solid particles close it below and above."""
-        return {"lower": [0.0, 0.0], "upper": [self.length, 1.0], "boundaries": [["periodic"] * 2, ["none"] * 2]}
+        return Domain((0, 0), (self.length, 1), [("periodic", "periodic"), ("none", "none")])
 
-    def bodies(self) -> list[dict[str, Any]]:
+    def bodies(self) -> list[SolidBody]:
         """Return the plates, which slide in place."""
-        velocities = {"lower": 0.0, "upper": self.upper_velocity}
-        return [
-            {"name": name, "velocity": [velocity, 0.0], "moves": False, "center": [self.length / 2, 0.5]}
-            for name, velocity in velocities.items()
-        ]
-
-    def particle_estimate(self) -> int:
-        """Return the number of particles."""
-        return round(self.length * self.resolution) * (self.resolution + 2 * self.support_layers)
+        middle = self.length / 2, 0.5
+        return [SolidBody("lower", middle), SolidBody("upper", middle, (self.upper_velocity, 0))]
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a lattice of fluid between the solid particles of the plates."""

@@ -11,6 +11,7 @@ from pydantic import Field
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
 from alsph.cases.base import Case
+from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_centres, lattice
 from alsph.geometry.particles import Kind, particles
 
@@ -36,13 +37,9 @@ class PressureJump(Case):
         """Time by which the waves have died out."""
         return 2.0
 
-    def domain(self) -> dict[str, Any]:
+    def domain(self) -> Domain:
         """Return the unit square."""
-        return {"lower": [0.0, 0.0], "upper": [1.0, 1.0], "boundaries": [["slip"] * 2, ["periodic"] * 2]}
-
-    def particle_estimate(self) -> int:
-        """Return the number of particles."""
-        return self.resolution**2
+        return Domain((0, 0), (1, 1), [("slip", "slip"), ("periodic", "periodic")])
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a lattice in the stream, its left half under pressure."""

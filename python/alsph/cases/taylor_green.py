@@ -15,6 +15,7 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
 from alsph.errors import ConfigError
+from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_centres, lattice
 from alsph.geometry.particles import Kind, particles
 
@@ -52,14 +53,10 @@ class TaylorGreen(Case):
         """What has been compared with an independent solution in 3-D; in 2-D each run is, with the exact one."""
         return (100, 100, 16) if self.dimensions == 3 else None
 
-    def domain(self) -> dict[str, Any]:
+    def domain(self) -> Domain:
         """Return the periodic unit box."""
         d = self.dimensions
-        return {"lower": [0.0] * d, "upper": [1.0] * d, "boundaries": [["periodic", "periodic"]] * d}
-
-    def particle_estimate(self) -> int:
-        """Return the number of particles."""
-        return int(self.resolution**self.dimensions)
+        return Domain([0] * d, [1] * d, [("periodic", "periodic")] * d)
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a lattice, displaced at random if asked for, with the initial velocity and pressure."""

@@ -5,15 +5,16 @@ the constant one [U²/D]; ``sliding``, the velocity of the surfaces of bodies th
 """
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from alsph.arrays import FloatArray
 from alsph.errors import ConfigError
+from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import lattice
 
 Rule = Callable[[FloatArray, float], ArrayLike | None]
@@ -107,17 +108,17 @@ def _difference(name: str, rule: Rule | None, then: Prescription | None) -> str:
     return f"another {what}: at t* = {then.time:.6g} its values differ by up to {change:.3g}"
 
 
-def fingerprint(name: str, rule: Rule, domain: dict[str, Any], until: float) -> str:
+def fingerprint(name: str, rule: Rule, domain: Domain, until: float) -> str:
     """Return a hash of what a rule gives at points of the domain, or its inlets, and times up to `until` [D/U]."""
     total = hashlib.sha256()
     shares = (np.arange(SAMPLES) + 0.5) / SAMPLES
-    lower, upper = np.array(domain["lower"], float), np.array(domain["upper"], float)
+    lower, upper = np.array(domain.lower), np.array(domain.upper)
     axes = list(lower[:, None] + np.outer(upper - lower, shares))
     grids = [axes]
     if name == "inflow":
         grids = [
             [np.array([plane]) if k == axis else values for k, values in enumerate(axes)]
-            for axis, _, plane in inlets(domain)
+            for axis, _, plane in domain.inlets()
         ]
     for grid in grids:
         for share in (np.arange(SAMPLES) * 0.618034) % 1:  # no multiples of a period
@@ -127,13 +128,13 @@ def fingerprint(name: str, rule: Rule, domain: dict[str, Any], until: float) -> 
     return total.hexdigest()
 
 
-def backflow(domain: dict[str, Any], position: FloatArray, velocity: FloatArray, time: float) -> str:
+def backflow(domain: Domain, position: FloatArray, velocity: FloatArray, time: float) -> str:
     """Return a warning if velocities prescribed at an inlet point out of the domain in places.
 
     Parameters
     ----------
     domain
-        ``lower``, ``upper`` and ``boundaries`` of the domain.
+        The domain.
     position, velocity : ndarray, shape (m, d)
         Of the inlet particles [D], [U].
     time
@@ -144,7 +145,7 @@ def backflow(domain: dict[str, Any], position: FloatArray, velocity: FloatArray,
     ConfigError
         If they do so on the whole: more fluid would leave through the inlet than enter.
     """
-    sides = list(inlets(domain))
+    sides = list(domain.inlets())
     if not sides or not len(position):
         return ""
     depth = np.stack([sign * (position[:, axis] - plane) for axis, sign, plane in sides])
@@ -165,11 +166,3 @@ def backflow(domain: dict[str, Any], position: FloatArray, velocity: FloatArray,
                 "near it, and a breakdown if this lasts"
             )
     return warning
-
-
-def inlets(domain: dict[str, Any]) -> Iterator[tuple[int, int, float]]:
-    """Yield axis, sign of the inward normal and plane of each side of a domain that is an inlet."""
-    for axis, sides in enumerate(domain["boundaries"]):
-        for side, sign, plane in zip(sides, (1, -1), (domain["lower"][axis], domain["upper"][axis]), strict=True):
-            if side == "inlet":
-                yield axis, sign, float(plane)

@@ -19,6 +19,7 @@ from alsph.arrays import FloatArray
 from alsph.engine.prescribed import Prescription, Rule, asked, backflow
 from alsph.engine.problem import Problem
 from alsph.errors import ConfigError, SharedError, SolverError
+from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Kind
 from alsph.text import shown
 
@@ -449,7 +450,7 @@ class Simulation:
 
     def _check_inflow(self, position: FloatArray, velocity: FloatArray) -> None:
         """Refuse backflow at an inlet, and warn once of such in places."""
-        warning = backflow(self.problem.settings["domain"], position, velocity, self.time)
+        warning = backflow(Domain.of(self.problem.settings["domain"]), position, velocity, self.time)
         if warning and not self.backflow:
             self.backflow = warning
             warnings.warn(warning, RuntimeWarning, stacklevel=4)

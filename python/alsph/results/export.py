@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -15,6 +14,7 @@ from alsph.arrays import AXES, FloatArray
 from alsph.errors import ConfigError
 from alsph.folder import vtkhdf
 from alsph.folder.durable import check_target, replacing
+from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Snapshot
 from alsph.text import shown
 
@@ -122,7 +122,7 @@ def grid(
     own_spacing: float,
     spacing: float | None,
     box: tuple[FloatArray, FloatArray],
-    domain: Mapping[str, Any],
+    domain: Domain,
 ) -> Grid:
     """Return the fields of a snapshot on a regular grid; see :meth:`alsph.Run.to_grid`."""
     spacing = own_spacing if spacing is None else spacing

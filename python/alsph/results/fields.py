@@ -19,6 +19,7 @@ from alsph.config import Config, of_run
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
 from alsph.geometry.particles import Snapshot
+from alsph.geometry.points import checked_box, checked_points
 from alsph.results import export
 from alsph.results.export import Grid
 from alsph.text import shown
@@ -102,8 +103,8 @@ class Fields:
             If there is no snapshot.
         """
         case = self.config.case
-        checked = sampling.checked_points(points, case.space_dimensions)
-        return sampling.at(self.snapshot(time), checked, self.spacing, case.domain())
+        checked = checked_points(points, case.space_dimensions)
+        return sampling.at(self.snapshot(time), checked, self.spacing, case.checked_domain)
 
     @cached_property
     def history(self) -> dict[str, FloatArray]:
@@ -146,9 +147,9 @@ class Fields:
         ConfigError
             If there is no such grid.
         """
-        domain, dimensions = self.config.case.domain(), self.config.case.space_dimensions
-        corners = domain["lower"] if lower is None else lower, domain["upper"] if upper is None else upper
-        box = checked_box(*corners, dimensions)
+        domain = self.config.case.checked_domain
+        corners = domain.lower if lower is None else lower, domain.upper if upper is None else upper
+        box = checked_box(*corners, domain.dimensions)
         return export.grid(self.snapshot(time), self.spacing, spacing, box, domain)
 
     def to_xarray(
@@ -205,22 +206,3 @@ class Fields:
         fields = snapshot.position[fluid], snapshot.velocity[fluid], snapshot.pressure[fluid]
         force = self.config.case.body_force_at(fields[0], snapshot.time)
         return sampling.control_volume(*fields, box, self.spacing, 1.0, viscosity, force)
-
-
-def checked_box(lower: Sequence[float], upper: Sequence[float], dimensions: int) -> tuple[FloatArray, FloatArray]:
-    """Return the corners of a box.
-
-    Raises
-    ------
-    ConfigError
-        If they are none.
-    """
-    try:
-        box = np.array(lower, dtype=float), np.array(upper, dtype=float)
-    except (TypeError, ValueError):
-        box = np.empty(0), np.empty(0)
-    if not box[0].shape == box[1].shape == (dimensions,) or not np.all(box[0] < box[1]):
-        raise ConfigError(
-            f"box from {shown(lower)} to {shown(upper)}: needs corners of {dimensions} numbers, the lower one first"
-        )
-    return box

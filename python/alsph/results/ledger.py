@@ -68,7 +68,7 @@ class Ledger:
         time, iterations, largest, mean, volume, energy = (run.history.get(name, np.empty(0)) for name in names)
         rate = np.gradient(energy, time) if len(time) > 1 else np.full_like(energy, np.nan)
         budget = np.full((3, len(run.times)), np.nan)
-        if len(time) and not _open(case):
+        if len(time) and not case.checked_domain.is_open:
             walls = np.interp(run.times, time, _wall_power(run, case))
             budget[:2] = np.array([_budget(run.snapshot(at), case) for at in run.times]).reshape(-1, 2).T
             budget[1] += walls
@@ -99,20 +99,17 @@ def mach_number(history: dict[str, FloatArray]) -> float:
     return float(np.mean(fastest[moving] * np.sqrt(step[moving] / penalty[moving]))) if moving.any() else np.nan
 
 
-def _open(case: Case) -> bool:
-    """Whether fluid enters or leaves through a boundary."""
-    return any(side in ("inlet", "outlet") for pair in case.domain()["boundaries"] for side in pair)
-
-
 def _wall_power(run: Record, case: Case) -> FloatArray:
     """Work of the moving bodies on the fluid in unit time (n,): minus the force on each times its velocity; or NaN."""
     power = np.zeros_like(run.history["time"])
     if "sliding" in case.rules:  # which the force on the whole body does not tell
         return np.full_like(power, np.nan)
-    for body in case.bodies():
-        for axis, speed in zip(AXES, body["velocity"], strict=False):
+    for body in case.checked_bodies:
+        if body.velocity is None:
+            return np.full_like(power, np.nan)
+        for axis, speed in zip(AXES, body.velocity, strict=False):
             for part in ("pressure", "viscous"):
-                power -= speed * run.history[f"{body['name']}_{part}_force_{axis}"]
+                power -= speed * run.history[f"{body.name}_{part}_force_{axis}"]
     return power
 
 
@@ -120,21 +117,8 @@ def _budget(snapshot: Snapshot, case: Case) -> tuple[float, float]:
     """Return dissipation and the body force's power in a snapshot."""
     fluid, spacing = snapshot.fluid, case.particle_spacing
     position, velocity, volume = snapshot.position[fluid], snapshot.velocity[fluid], spacing**case.space_dimensions
-    gradient = sampling.interpolate(*_with_images(position, velocity, case), position, spacing)[1]
+    images = sampling.with_images(position, velocity, case.checked_domain, sampling.REACH * spacing)
+    gradient = sampling.interpolate(*images, position, spacing)[1]
     strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
     power = (velocity * case.body_force_at(position, snapshot.time)).sum()
     return 2 * case.kinematic_viscosity * volume * float((strain**2).sum()), volume * float(power)
-
-
-def _with_images(position: FloatArray, velocity: FloatArray, case: Case) -> tuple[FloatArray, FloatArray]:
-    """Append the images of the particles near the periodic sides."""
-    domain, width = case.domain(), 4 * case.particle_spacing
-    for axis, (lower, upper, sides) in enumerate(
-        zip(*(domain[k] for k in ("lower", "upper", "boundaries")), strict=True)
-    ):
-        if "periodic" in sides:
-            along, length = position[:, axis], np.eye(position.shape[1])[axis] * (upper - lower)
-            first, last = along < lower + width, along > upper - width
-            position = np.concatenate([position, position[first] + length, position[last] - length])
-            velocity = np.concatenate([velocity, velocity[first], velocity[last]])
-    return position, velocity

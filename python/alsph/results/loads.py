@@ -13,7 +13,8 @@ from alsph.analysis.loads import Divergence, Load, PressureCoefficient
 from alsph.arrays import AXES, FloatArray
 from alsph.errors import ConfigError
 from alsph.folder import reading
-from alsph.parameters import checked_point, choose
+from alsph.geometry.points import checked_point
+from alsph.parameters import choose
 from alsph.results.fields import Fields
 from alsph.text import shown
 
@@ -36,7 +37,7 @@ class Loads(Fields):
         """Return the bodies and the parts that a load is the sum of."""
         choose("part", part, ("total", "pressure", "viscous"))
         if body is not None:
-            choose("body", body, self.bodies or [known["name"] for known in self.config.case.bodies()])
+            choose("body", body, self.bodies or [known.name for known in self.config.case.checked_bodies])
         names = [body] if body else self.config.case.coefficient_bodies or self.bodies[:1]
         return names, ("pressure", "viscous") if part == "total" else (part,)
 
@@ -129,7 +130,7 @@ class Loads(Fields):
         case = self.config.case
         names, parts = self._chosen(body, part)
         point = case.moment_point if about is None else checked_point("about", about)
-        centres = {each["name"]: each["center"] for each in case.bodies()}
+        centres = {each.name: each.center for each in case.checked_bodies}
         missing = np.full(len(self.history["time"]), np.nan)
         moment = np.zeros_like(missing)
         for name in names:

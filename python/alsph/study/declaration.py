@@ -224,7 +224,7 @@ def digest(configuration: Config, *without: str) -> str:
     if initial is not None:
         tables["run"]["initial_run"] = beginning.flow_sha256(Run(initial))
     for name, rule in case.rules.items():
-        tables[name] = fingerprint(name, rule, case.domain(), configuration.until)
+        tables[name] = fingerprint(name, rule, case.checked_domain, configuration.until)
     return hashlib.sha256(json.dumps(tables, sort_keys=True).encode()).hexdigest()
 
 
