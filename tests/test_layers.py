@@ -96,7 +96,7 @@ PYTHON_FLOORS = (
     ("_alsph", "arrays", "text"),
     ("errors",),
     ("memory", "parameters", "tables", "expressions"),
-    ("geometry", "reference"),
+    ("geometry", "reference", "units"),
     ("analysis", "engine"),
     ("cases", "folder"),
     ("config",),

@@ -14,6 +14,7 @@ from . import (
     results,
     running,
     study,
+    units,
 )
 from .engine.simulation import Simulation
 from .geometry.domain import Domain, SolidBody
@@ -24,6 +25,7 @@ from .study.autotune import autotune
 from .study.comparison import Comparison, compare
 from .study.convergence import converge
 from .study.validation import validate
+from .units import Units
 
 __version__: str
 
@@ -33,6 +35,7 @@ __all__ = [
     "Run",
     "Simulation",
     "SolidBody",
+    "Units",
     "__version__",
     "autotune",
     "cases",
@@ -54,4 +57,5 @@ __all__ = [
     "reference",
     "results",
     "running",
+    "units",
 ]

@@ -124,6 +124,10 @@ class Config:
         values = {name: values[name] for name in self.case.parameter_names()}
         return {"case": self.case.declaration()} | {name: value for name, value in values.items() if value is not None}
 
+    def flow_tables(self) -> dict[str, Any]:
+        """Return those of the case without what changes no result."""
+        return of_the_flow(self.case_tables())
+
     def check(self) -> None:
         """Refuse parameters that a file cannot give back, and probes outside of the domain.
 
@@ -154,6 +158,11 @@ class Config:
     def save(self, path: Path) -> None:
         """Write the configuration with all its parameters to a TOML file."""
         path.write_bytes(self.text().encode())
+
+
+def of_the_flow(tables: dict[str, Any]) -> dict[str, Any]:
+    """Return the tables of a case without its units, of which no more than the Reynolds number counts."""
+    return {name: value for name, value in tables.items() if name != "units"}
 
 
 def from_tables(tables: dict[str, Any], *folders: Path) -> Config:

@@ -121,6 +121,8 @@ class Parameters(BaseModel):
 
 def describe_default(model: type[Parameters], name: str) -> str:
     """Return the default of a parameter as a user would type it."""
+    if model.model_fields[name].is_required():
+        return "must be given"
     default = model.model_fields[name].default
     return "automatic" if default is None else f"{default:.6g}" if isinstance(default, float) else str(default).lower()
 

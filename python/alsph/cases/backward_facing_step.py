@@ -64,9 +64,9 @@ class BackwardFacingStep(Case):
         return 1.0 / (self.expansion - 1.0)
 
     @property
-    def kinematic_viscosity(self) -> float:
-        """Kinematic viscosity ν [UD], from Re = 2hU/ν."""
-        return 2.0 * self.inlet_height / self.reynolds
+    def reynolds_length(self) -> float:
+        """Length 2h that the Reynolds number is formed with [D]."""
+        return 2.0 * self.inlet_height
 
     def domain(self) -> Domain:
         """Return the bounds of the channel: inlet and outlet; solid particles close the rest."""

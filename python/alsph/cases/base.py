@@ -19,6 +19,7 @@ from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
+from alsph.cases.dimensional import Dimensional
 from alsph.cases.method import Method
 from alsph.engine.output import Output
 from alsph.engine.prescribed import Rule, asked
@@ -57,7 +58,7 @@ def title_of(model: type) -> str:
     return first[:1].lower() + first[1:] or name_of(model)
 
 
-class Case(Method):
+class Case(Dimensional):
     """A flow problem with its numerical parameters.
 
     Every case is computed in its own reference units: lengths in D, velocities in U, density in ρ, hence times in D/U,
@@ -77,7 +78,6 @@ class Case(Method):
     code: ClassVar[Any] = None
     """The Python file of the user's that it stands in, a :class:`alsph.cases.source.Source`."""
 
-    reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, ge=8, description="particles per reference length, D/Δx [-]")
     inlet_velocity: str | None = Field(
         default=None,
@@ -132,11 +132,6 @@ class Case(Method):
     def space_dimensions(self) -> int:
         """Number of space dimensions, 2 or 3."""
         return 2
-
-    @property
-    def kinematic_viscosity(self) -> float:
-        """Kinematic viscosity ν [UD]."""
-        return 1.0 / self.reynolds
 
     @property
     def largest_time_step(self) -> float:

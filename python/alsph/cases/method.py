@@ -45,7 +45,7 @@ def superseded(changes: Mapping[str, Any], before: Mapping[str, Any]) -> tuple[s
     """Names of the parameters whose place others take, of a case that had those of `before`.
 
     A Courant number takes that of the paper's pair, which takes its; the coefficient of a shifting goes with its kind,
-    the rule of the walls' pressure with the scheme, if it was the scheme's.
+    the rule of the walls' pressure with the scheme, if it was the scheme's. From units the Reynolds number follows.
     """
     others: tuple[str, ...] = ()
     if any(changes.get(name) is not None for name in ("shifting", "dimensions")):
@@ -53,6 +53,8 @@ def superseded(changes: Mapping[str, Any], before: Mapping[str, Any]) -> tuple[s
     schemes = [table.get("scheme") or "alsph" for table in (before, {**before, **changes})]
     if schemes[0] != schemes[1] and before.get("wall_pressure") == _wall_pressure(schemes[0]):
         others += ("wall_pressure",)
+    if changes.get("units") is not None:
+        others += ("reynolds",)
     if changes.get("courant") is not None:
         return (*PAPER, *others)
     return ("courant", *others) if _as_in_the_paper(changes) else others

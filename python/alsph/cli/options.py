@@ -19,6 +19,7 @@ from alsph.config import RunSettings
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters, describe_default
 from alsph.text import shown
+from alsph.units import Units
 
 StudyName = Annotated[str, typer.Argument(metavar="NAME|FILE.toml", help="study: see alsph study list")]
 
@@ -44,14 +45,17 @@ WORDS = {int: "a whole number", float: "a number"}
 
 METAVARS: dict[Any, str] = {int: "INTEGER", float: "FLOAT", list[str]: "TEXT"}
 
+UNITS = {f"units_{name}" for name in Units.model_fields}
+"""The entries of the table `units` as options."""
+
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="run folder")]
 
 
 def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Callable[..., None]:
     """Return a command for a case: `action` called with the configuration that the options make."""
     own = list(inspect.signature(action).parameters.values())[1:]
-    taken = {parameter.name for parameter in own} | RunSettings.model_fields.keys() | {"context", "case", "run"}
-    names = model.parameter_names()
+    taken = {parameter.name for parameter in own} | RunSettings.model_fields.keys() | UNITS | {"context", "case", "run"}
+    names = [name for name in model.parameter_names() if name != "units"]
     if clashes := sorted(taken & model.model_fields.keys()):
         raise ConfigError(
             f"{model.__name__}: its parameter '{clashes[0]}' has the name of an option; give it another one"
@@ -67,6 +71,8 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
         tables: dict[str, Any] = context.obj.tables() if context.obj else {"case": model.declaration(), "run": {}}
         joined = {name: "; ".join(value) or None for name, value in values.items() if isinstance(value, list)}
         given = {name: value for name, value in (values | joined).items() if value is not None}
+        if units := {name.removeprefix("units_"): given.pop(name) for name in UNITS & given.keys()}:
+            given["units"] = tables.get("units", {}) | units
         for name in cases.method.superseded(given, tables):
             tables.pop(name, None)
         for name, value in given.items():
@@ -80,6 +86,7 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
         *keywords,
         *_options("Parameters of the problem", model, [name for name in names if name not in Method.model_fields]),
         *_options("Parameters of the method", model, [name for name in names if name in Method.model_fields]),
+        *_options("Units", Units, Units.model_fields, "units_", **dict.fromkeys(Units.model_fields, "not said")),
         *_options("Settings of the run", RunSettings, RunSettings.model_fields, until=until, threads="all cores"),
     ]
     functools.update_wrapper(command, action)
@@ -135,12 +142,12 @@ class CaseCommand(TyperCommand):
 
 
 def _options(
-    section: str, model: type[Parameters], names: Iterable[str], **defaults: str
+    section: str, model: type[Parameters], names: Iterable[str], prefix: str = "", **defaults: str
 ) -> Iterator[inspect.Parameter]:
     """Make an option of each named field of a model; `defaults` says what stands for None."""
     for name in names:
         kind, choices = _option_type(model.model_fields[name].annotation)
-        flag = f"--{name.replace('_', '-')}"
+        flag = f"--{prefix}{name}".replace("_", "-")
         option = typer.Option(
             f"{flag}/--no-{flag[2:]}" if kind is bool else flag,
             help=f"{model.describe(name)}  [default: {defaults.get(name) or describe_default(model, name)}]",
@@ -150,7 +157,7 @@ def _options(
             parser=_choice_of(choices) if choices else _number_of(kind) if kind in WORDS else None,
         )
         yield inspect.Parameter(
-            name,
+            prefix + name,
             inspect.Parameter.KEYWORD_ONLY,
             default=None,
             annotation=Annotated[Union[kind, None], option],  # noqa: UP007

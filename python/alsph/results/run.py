@@ -16,16 +16,18 @@ from alsph.analysis.measures import Measure, Profile
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.source import reason, shown_name
-from alsph.errors import RunFolderError
+from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
 from alsph.folder.durable import check_folder
 from alsph.folder.run_folder import RunFolder
 from alsph.geometry.particles import Field
 from alsph.parameters import choose
+from alsph.results.dimensional import dimensional
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.loads import Loads
 from alsph.results.outcome import outcome
 from alsph.text import duration, in_figure, printable, shown
+from alsph.units import Units
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -117,11 +119,45 @@ class Run(Loads):
         """
         return [*outcome(self, self.config.until), *self._judged[1], *self.config.case.remarks()]
 
+    @property
+    def units(self) -> Units | None:
+        """What D, U, ρ and ν are in SI, if the case says so."""
+        return self.config.case.units
+
+    def dimensional(self, units: Units | None = None) -> dict[str, Estimate]:
+        """Return the main results that have a dimension in SI, by their names with the unit, as ``mean drag, N/m``.
+
+        Parameters
+        ----------
+        units : Units, optional
+            What D, U, ρ and ν are; those of the case if None.
+
+        Raises
+        ------
+        ConfigError
+            If there are none, or they make another Reynolds number than the run's.
+        """
+        case = self.config.case
+        if units is not None:
+            case = case.replace(units=units, reynolds=case.reynolds)
+        if case.units is None:
+            raise ConfigError(f"{self.path}: its case has no units; use run.dimensional(alsph.Units(...))")
+        return dimensional(self._results(), case.units, case.space_dimensions, case.chord)
+
     def summary(self) -> dict[str, Any]:
         """Return the run's main results by name, its measures each followed by the reference value where there is one.
 
-        ``str()`` of each value is fit to be read.
+        Where the case has units, the results in SI follow. ``str()`` of each value is fit to be read.
         """
+        results = self._results()
+        if self.units is not None:
+            known = {name: value for name, value in self.dimensional().items() if not np.isnan(value)}
+            results |= {"units": str(self.units)} | known
+        results |= {f"remark {number}": remark for number, remark in enumerate(self.remarks, 1)}
+        return {name: value for name, value in results.items() if value != ""}
+
+    def _results(self) -> dict[str, Any]:
+        """Return the results in D, U and ρ by name."""
         steps = len(self.history["time"])
         results: dict[str, Any] = {
             "case": self.config.case.name,
@@ -148,8 +184,7 @@ class Run(Loads):
             results[measure.name] = value if isinstance(value, Estimate) else Estimate(value)
             if np.abs(measure.reference) > 0:
                 results[f"{measure.name}, reference"] = Estimate(measure.reference)
-        results |= {f"remark {number}": remark for number, remark in enumerate(self.remarks, 1)}
-        return {name: value for name, value in results.items() if value != ""}
+        return results
 
     def _iterations(self) -> str:
         """How many iterations a step took, and how many it may take, in words."""

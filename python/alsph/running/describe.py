@@ -11,6 +11,7 @@ from alsph.errors import SolverError
 from alsph.geometry.particles import Kind
 from alsph.running.outputs import remarks_of
 from alsph.text import duration
+from alsph.units import Units
 
 PROBE_SECONDS = 5.0
 
@@ -57,6 +58,7 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
         if np.isfinite(limit):
             text = f"ΔtU/Δx < {limit:.4g} at u_max = {case.velocity_max:g} U{' (binds)' if name == binding else ''}"
             lines.append((f"{name.replace('_', ' ')} limit", text))
+    lines += _in_si(case.units, step * case.particle_spacing, config.until) if case.units else []
     lines.append(("steps", f"about {steps:,.0f} to t* = {config.until:g}"))
     if probe:
         try:
@@ -67,6 +69,16 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
     if warning := case.time_step_warning():
         lines.append(("warning", warning))
     return lines + [("remark", remark) for remark in remarks_of(config, problem.state)]
+
+
+def _in_si(units: Units, step: float, until: float) -> list[tuple[str, str]]:
+    """Return what is to be known of units, and a time step and end time [D/U] in them."""
+    second = units.factor("time")
+    return [
+        ("units", f"{units}; D/U = {second:.4g} s"),
+        ("time step in SI", f"{step * second:.4g} s"),
+        ("duration in SI", f"{until * second:.4g} s"),
+    ]
 
 
 def _seconds_per_step(simulation: Simulation) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 from alsph import config
 from alsph.arrays import size_of
 from alsph.cases.base import Case
-from alsph.config import Config, RunSettings, of_run
+from alsph.config import Config, RunSettings, of_run, of_the_flow
 from alsph.engine.prescribed import difference
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.folder.checkpoint import Checkpoint
@@ -64,7 +64,7 @@ def complete(config: Config, path: Path, control: Control | None = None) -> Run:
         info = folder.last_info()
         # Retries shorten the time step: the run is still that of the case that it began with.
         began = info.get("began", {}) if info.get("retries") else kept.case_tables()
-        alike = (began, kept.until) == (config.case_tables(), config.until)
+        alike = (of_the_flow(began), kept.until) == (config.flow_tables(), config.until)
         if alike and beginning.alike(config, kept, folder, info):
             if info.get("status") == "finished":
                 return Run(path)
@@ -166,7 +166,7 @@ def _check_parameters(config: Config, folder: RunFolder) -> None:
 
 def _changes(now: Config, saved: Checkpoint, folder: RunFolder) -> list[str]:
     """Say how the case differs from the one that a checkpoint was made with."""
-    then, tables = saved.case or {}, now.case_tables()
+    then, tables = of_the_flow(saved.case or {}), now.flow_tables()
     if then == tables:
         return []
     try:

@@ -13,7 +13,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from alsph import config
-from alsph.config import Config
+from alsph.config import Config, of_the_flow
 from alsph.engine.prescribed import fingerprint
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters, suggest
@@ -218,7 +218,7 @@ def digest(configuration: Config, *without: str) -> str:
     RunFolderError
         If there is no flow in the run that it begins with.
     """
-    tables = {name: value for name, value in configuration.tables().items() if name not in without}
+    tables = {name: value for name, value in of_the_flow(configuration.tables()).items() if name not in without}
     tables["run"] = {name: value for name, value in tables["run"].items() if name not in UNHASHED}
     case, initial = configuration.case, configuration.run.initial_run
     if initial is not None:

@@ -1,0 +1,63 @@
+"""Results in SI: those of a run that have a dimension, by what their names say that they are."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from alsph.analysis.averages import Estimate
+from alsph.units import QUANTITIES, Quantity, Units
+
+IN_UNITS: dict[str, Quantity] = {
+    ", D": "length",
+    ", U": "velocity",
+    ", U/D": "rate",
+    ", ρU²": "pressure",
+    ", tU/D": "time",
+    " tU/D": "time",
+}
+"""What a result is whose name ends so."""
+
+REFERENCE = ", reference"
+
+
+def dimensional(results: Mapping[str, Any], units: Units, dimensions: int, chord: float) -> dict[str, Estimate]:
+    """Return those of the results of a run that have a dimension, in SI, under their names with the unit.
+
+    Parameters
+    ----------
+    results
+        Results in D, U and ρ by name; coefficients are F/(½ρU²D) and M/(½ρU²c²).
+    units
+        What D, U and ρ are.
+    dimensions
+        Number of space dimensions: in 2-D forces are per length.
+    chord
+        Length c that moment coefficients are formed with [D].
+    """
+    found = {}
+    for name, value in results.items():
+        base = name.removesuffix(REFERENCE)
+        known = _known(base, dimensions, chord)
+        if known and isinstance(value, Estimate):
+            title, quantity, share = known
+            factor = share * units.factor(quantity)
+            own = f"{title}{REFERENCE if base != name else ''}, {QUANTITIES[quantity][0]}"
+            found[own] = Estimate(value * factor, value.uncertainty * factor, value.note)
+    return found
+
+
+def _known(name: str, dimensions: int, chord: float) -> tuple[str, Quantity, float] | None:
+    """Return what a result is called in SI, its quantity, and the share of its unit that it is given in."""
+    if name == "Strouhal number":
+        return "shedding frequency", "frequency", 1.0
+    if re.search(r"\b(drag|lift) coefficient\b", name):
+        force: Quantity = "force_per_length" if dimensions == 2 else "force"
+        return name.replace(" coefficient", ""), force, 0.5
+    if "moment coefficient" in name and dimensions == 2:
+        return name.replace(" coefficient", ""), "moment_per_length", 0.5 * chord**2
+    for end, quantity in IN_UNITS.items():
+        if name.endswith(end):
+            return name.removesuffix(end), quantity, 1.0
+    return None
