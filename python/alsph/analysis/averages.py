@@ -106,7 +106,7 @@ def mean(time: FloatArray, values: FloatArray, window: Window) -> Estimate:
     """Time average over the window, (21), with its uncertainty as the mean of the settled flow.
 
     The uncertainty is that of correlated averages over the shedding periods, of their trend if they have one
-    (:func:`alsph.analysis.uncertainty.of_mean`), and infinite where the flow still grows.
+    (:func:`alsph.analysis.uncertainty.uncertainty_of_mean`), and infinite where the flow still grows.
     """
     if window.edges.size < 2:
         return Estimate(np.nan, note=window.rule)
