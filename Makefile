@@ -4,12 +4,13 @@ PYTHON ?= python3
 BIN := .venv/bin
 ENVIRONMENT := .venv/.environment
 TOOLS := .venv/.tools
+SPHINX := .venv/.sphinx
 MUTMUT := target/mutmut
 EXTENSION := python/alsph/_alsph.abi3.so
 SOURCES := Cargo.toml Cargo.lock pyproject.toml $(shell find rust -name '*.rs')
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: build run wheel test test-rust test-python test-validation validate bench clean mutants-python
+.PHONY: build run wheel test test-rust test-python test-validation validate docs bench clean mutants-python
 
 build: $(EXTENSION)
 
@@ -37,6 +38,10 @@ test-validation: $(EXTENSION)  ## The quick validation from scratch.
 
 validate: $(EXTENSION)  ## Cases beside their reference solutions, in minutes on two cores.
 	$(BIN)/alsph validate
+
+docs: $(EXTENSION) $(SPHINX)  ## The documentation site, in target/docs; a warning is an error.
+	rm -rf docs/generated
+	$(BIN)/python -m sphinx --fresh-env --fail-on-warning --keep-going -b html docs target/docs
 
 wheel: $(ENVIRONMENT)  ## A wheel for every Linux of this machine's kind with glibc 2.28 or later, in target/wheels.
 	$(BIN)/python -m pip install --quiet --group wheel
@@ -69,6 +74,10 @@ $(ENVIRONMENT): pyproject.toml
 
 $(TOOLS): $(ENVIRONMENT)
 	$(BIN)/python -m pip install --quiet --group test
+	touch $@
+
+$(SPHINX): $(ENVIRONMENT)
+	$(BIN)/python -m pip install --quiet --group docs
 	touch $@
 
 $(EXTENSION): $(ENVIRONMENT) $(SOURCES)

@@ -2,7 +2,6 @@ import re
 import tomllib
 from pathlib import Path
 
-import pytest
 from alsph import cases, config
 
 README = Path(__file__).parent.parent / "README.md"
@@ -46,19 +45,6 @@ def test_the_examples_of_adding_run(tmp_path, monkeypatch, capsys):
         exec(compile(example, str(ADD_YOUR_OWN), "exec"), {"__name__": "add_your_own"})
     out = capsys.readouterr().out
     assert "share of the energy that is lost" in out
-
-
-@pytest.mark.parametrize("page", [README, ADD_YOUR_OWN], ids=lambda page: page.stem)
-def test_links_lead_somewhere(page):
-    text = page.read_text(encoding="utf-8")
-    links = re.findall(r"\]\(([^)#:]+)\)", text)
-    assert "](" in text and [link for link in links if not (page.parent / link).exists()] == []
-    headings = {
-        re.sub(r"[^\w -]", "", line.lstrip("# ").lower()).replace(" ", "-")
-        for line in text.splitlines()
-        if line[:1] == "#"
-    }
-    assert set(re.findall(r"\]\(#([^)]+)\)", text)) <= headings
 
 
 def test_the_files_that_adding_touches_are_there():

@@ -1,0 +1,66 @@
+"""The directive ``commands``: every command of alsph with its options, as typer knows them."""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from alsph.cases import Cylinder
+from alsph.cli import app
+from alsph.cli.options import CaseGroup
+from docutils.nodes import Node
+from sphinx.util.docutils import SphinxDirective
+from typer import Context
+from typer.main import get_command
+
+OF_A_CASE = "and the [parameters of the case](api.md#cases), with dashes: `inlet_velocity` is `--inlet-velocity`."
+
+
+def _plain(text: str) -> str:
+    """Return a text that Markdown takes as it stands."""
+    return re.sub(r"([\\`*_\[\]<>|$#])", r"\\\1", " ".join(text.split()))
+
+
+def _options(command: Any, context: Any, left_out: Any = ()) -> Iterator[str]:
+    """Yield a table of arguments and options."""
+    records = [each.get_help_record(context) for each in command.params if each.name not in left_out]
+    if any(records):
+        yield "\n| option | |\n|---|---|"
+        for names, text in filter(None, records):
+            yield f"| `{names.replace('|', chr(92) + '|')}` | {_plain(text)} |"
+
+
+def _described(name: str, command: Any, above: Any, level: int) -> Iterator[str]:
+    """Yield the section of a command, then those of its own commands."""
+    context = Context(command, info_name=name, parent=above)
+    usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
+    yield f"\n{'#' * level} {context.command_path}\n\n    {usage}\n"
+    yield from (f"{_plain(paragraph)}\n" for paragraph in (command.help or "").split("\n\n"))
+    if isinstance(command, CaseGroup):
+        case = command.get_command(context, Cylinder.name)  # one stands for all
+        yield from _options(case, Context(case, info_name="CASE", parent=context), Cylinder.model_fields.keys())
+        yield f"\n{OF_A_CASE}\n"
+    else:
+        yield from _options(command, context)
+    if above is None or not isinstance(command, CaseGroup):
+        for other in getattr(command, "commands", ()):
+            yield from _described(other, command.commands[other], context, level + 1)
+
+
+def described() -> Iterator[str]:
+    """Yield the Markdown of all commands."""
+    return _described("alsph", get_command(app), None, 2)
+
+
+class Commands(SphinxDirective):
+    """A section for each command."""
+
+    def run(self) -> list[Node]:
+        """Return the sections."""
+        text = "\n".join(described())
+        return self.parse_text_to_nodes(text, allow_section_headings=True)
+
+
+def setup(sphinx: Any) -> dict[str, bool]:
+    """Tell Sphinx of the directive."""
+    sphinx.add_directive("commands", Commands)
+    return {"parallel_read_safe": True}

@@ -1,0 +1,45 @@
+"""Make the pictures of gallery.md again, from the commands that stand in it: `python docs/gallery.py [CASE]...`."""
+
+import re
+import resource
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import alsph
+
+HERE = Path(__file__).parent
+RUNS = HERE.parent / "target" / "gallery"
+FIELDS = {"cavity": "velocity", "body": "velocity", "backward_facing_step": "velocity", "pressure_jump": "pressure"}
+"""The field of each picture that is neither of the vorticity nor a profile."""
+
+
+def commands() -> dict[str, list[str]]:
+    """Return the command of each case in gallery.md."""
+    text = (HERE / "gallery.md").read_text(encoding="utf-8")
+    lines = re.findall(r"^    alsph (run (\w+) .*)$", text, re.MULTILINE)
+    return {case: shlex.split(line) for line, case in lines}
+
+
+def compute(case: str, arguments: list[str]) -> None:
+    """Run a case on one thread, and tell what that took."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    command = [sys.executable, "-m", "alsph", *arguments, "--threads", "1", "--force", "--output", str(RUNS / case)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    print(f"{case}: {resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before:.0f} s of one core", flush=True)
+
+
+def draw(case: str) -> None:
+    """Save the picture of a run: the profile where it has one, a field otherwise."""
+    run = alsph.open_run(RUNS / case)
+    profile = next((each for each in run.profiles if case not in FIELDS and not run.body), None)
+    figure = run.plot_profile(profile) if profile else run.plot_field(FIELDS.get(case, "vorticity"))
+    figure.savefig(HERE / "images" / "gallery" / f"{case}.png", dpi=70, pil_kwargs={"optimize": True})
+
+
+if __name__ == "__main__":
+    for name, line in commands().items():
+        if name in sys.argv[1:] or not sys.argv[1:]:
+            compute(name, line)
+            draw(name)
