@@ -102,7 +102,7 @@ PYTHON_FLOORS = (
     ("config",),
     ("results",),
     ("plotting", "running"),
-    ("study",),
+    ("study", "watching"),
     ("__init__",),
     ("cli",),
     ("__main__",),

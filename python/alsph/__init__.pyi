@@ -15,6 +15,7 @@ from . import (
     running,
     study,
     units,
+    watching,
 )
 from .engine.simulation import Simulation
 from .geometry.domain import Domain, SolidBody
@@ -26,6 +27,7 @@ from .study.comparison import Comparison, compare
 from .study.convergence import converge
 from .study.validation import validate
 from .units import Units
+from .watching.server import watch
 
 __version__: str
 
@@ -47,6 +49,7 @@ __all__ = [
     "resume",
     "study",
     "validate",
+    "watch",
     "analysis",
     "config",
     "engine",
@@ -58,4 +61,5 @@ __all__ = [
     "results",
     "running",
     "units",
+    "watching",
 ]

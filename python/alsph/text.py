@@ -8,8 +8,8 @@ from typing import Any
 LONGEST_VALUE = 80
 
 
-def contents(path: Path, most_bytes: int) -> bytes:
-    """Read a file of at most so many bytes.
+def contents(path: Path, most_bytes: int, start: int = 0) -> bytes:
+    """Read a file, from a byte on, of at most so many bytes.
 
     Raises
     ------
@@ -19,9 +19,10 @@ def contents(path: Path, most_bytes: int) -> bytes:
     if path.exists() and not path.is_file():
         raise OSError(errno.EINVAL, "no regular file")
     with path.open("rb") as file:
-        size = os.fstat(file.fileno()).st_size
+        size = max(0, os.fstat(file.fileno()).st_size - start)
         if size > most_bytes:
             raise OSError(errno.EFBIG, f"larger than {most_bytes / 2**20:g} MiB")
+        file.seek(start)
         return file.read(size)
 
 

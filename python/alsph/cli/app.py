@@ -1,4 +1,4 @@
-"""The command line: ``alsph run | resume | repeat | describe | plot | info | validate | study | ...``.
+"""The command line: ``alsph run | resume | repeat | describe | info | watch | plot | validate | study | ...``.
 
 The options of ``run`` and ``describe`` are the fields of the case and of :class:`alsph.config.RunSettings`.
 """
@@ -22,6 +22,7 @@ COMMANDS = {
     "resume": ("runs", "Go on with a run from its newest sound checkpoint."),
     "repeat": ("runs", "Repeat a run from its start, without writing anything, and compare it bit by bit."),
     "info": ("runs", "Tell the state and the results of a run."),
+    "watch": ("runs", "Show a run, going on or ended, on a page in a browser."),
     "plot": ("runs", "Draw the figures of a run."),
     "export": ("runs", "Write a snapshot of a run on a regular grid, for other programs."),
     "compare": ("studies", "Compare runs: what differs in them, what they found, and how far apart they are."),

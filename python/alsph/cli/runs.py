@@ -1,4 +1,4 @@
-"""The commands of a run folder: resume, repeat, info, plot, animate and export."""
+"""The commands of a run folder: resume, repeat, info, watch, plot, animate and export."""
 
 import functools
 import re
@@ -24,6 +24,7 @@ from alsph.running.control import seconds_of
 from alsph.running.repetition import repeat
 from alsph.running.start import resume
 from alsph.tables import markdown
+from alsph.watching.server import watch
 
 KINDS = ("png", "pdf", "svg")
 """Formats of figures."""
@@ -61,6 +62,30 @@ def _repeat(path: RunPath, threads: Threads = None) -> None:
 def _info(path: RunPath) -> None:
     """Tell the state and the results of a run."""
     say_run(Run(path))
+
+
+@app.command("watch")
+@exit_codes()
+def _watch(
+    path: RunPath,
+    port: Annotated[
+        int | None, typer.Option(metavar="N", help="port of the page", show_default="the first free from 8000 on")
+    ] = None,
+    browser: Annotated[bool, typer.Option(help="open the page, where there is a screen")] = True,
+) -> None:
+    """Show a run, going on or ended, on a page in a browser, until Ctrl-C.
+
+    State and time left, forces, divergence and time step, means and remarks, the newest field and figures. The page
+    keeps itself up to date; the run folder is only read, and the run is not disturbed.
+
+    The page is served on this machine alone, to whoever is logged in on it. For a run on another machine start this
+    there, and from where you sit
+
+        ssh -L 8000:localhost:8000 HOST
+
+    then open http://localhost:8000.
+    """
+    watch(path, port, browser=browser)
 
 
 @app.command("runs")

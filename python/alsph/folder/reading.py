@@ -107,20 +107,65 @@ def _of_kinds(table: Any, kinds: dict[str, Any], complete: bool) -> bool:
     )
 
 
+class History:
+    """``history.csv`` of a run that may be going on: what has been added is read, not all of it again."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._forget()
+
+    def _forget(self) -> None:
+        self._names: list[str] = []
+        self._table = np.empty((0, 0))
+        self._end, self._last = 0, b""  # how far it has been read, and the line there
+
+    def read(self) -> dict[str, FloatArray]:
+        """Return the columns, without lines that are cut short; an empty ``time`` if there is no file yet.
+
+        Raises
+        ------
+        RunFolderError
+            If it is unreadable.
+        """
+        try:
+            if not self.path.exists():
+                self._forget()
+            elif added := self._added():
+                self._append(added)
+        except RunFolderError:
+            self._forget()
+            raise
+        return dict(zip(self._names, self._table.T, strict=True)) or {"time": np.empty(0)}
+
+    def _added(self) -> bytes:
+        """Return the whole lines that have not been read yet: all of them if it is another file than before."""
+        most = int(min(free_memory(), LARGEST_NUMBER)) // 10
+        with _refusing(self.path, OSError):
+            text = contents(self.path, most, self._end - len(self._last))
+            if not text.startswith(self._last):  # cut back or replaced
+                self._forget()
+                text = contents(self.path, most)
+        return text[len(self._last) : text.rfind(b"\n") + 1]
+
+    def _append(self, added: bytes) -> None:
+        with _refusing(self.path, UnicodeDecodeError):
+            lines = added.decode("utf-8").splitlines()
+        if not self._names:
+            self._names = lines.pop(0).split(",")
+            if "time" not in self._names:
+                raise RunFolderError(f"{self.path}: no column 'time' in the first line; is this a run folder of alsph?")
+            self._table = np.empty((0, len(self._names)))
+        rows = [line for line in lines if line.count(",") == len(self._names) - 1]
+        with _refusing(self.path, ValueError):
+            if rows:
+                self._table = np.concatenate([self._table, np.loadtxt(rows, delimiter=",", ndmin=2)])
+        self._end += len(added)
+        self._last = added[added.rfind(b"\n", 0, -1) + 1 :]
+
+
 def history(path: Path) -> dict[str, FloatArray]:
     """Read ``history.csv`` by column, without lines that are cut short; an empty ``time`` if there is no file yet."""
-    if not path.exists():
-        return {"time": np.empty(0)}
-    with _refusing(path, OSError, UnicodeDecodeError):
-        text = contents(path, int(min(free_memory(), LARGEST_NUMBER)) // 10).decode("utf-8")
-    header, *lines = text[: text.rfind("\n") + 1].splitlines() or [""]
-    names = header.split(",")
-    if "time" not in names:
-        raise RunFolderError(f"{path}: no column 'time' in the first line; is this a run folder of alsph?")
-    rows = [line for line in lines if line.count(",") == len(names) - 1]
-    with _refusing(path, ValueError):
-        table = np.loadtxt(rows, delimiter=",", ndmin=2) if rows else np.empty((0, len(names)))
-    return dict(zip(names, table.T, strict=True))
+    return History(path).read()
 
 
 @contextmanager

@@ -28,7 +28,8 @@ def forces(run: Run, body: str | None = None) -> Figure:
         parts = {part: run.coefficient(axis, part, body) for part in ("viscous", "pressure", "total")}
         for (part, values), colour in zip(parts.items(), ("C2", "C1", "C0"), strict=True):
             axes.plot(time, values, colour, lw=1, label=part)
-        _robust_limits(axes, [(time, values) for values in parts.values()])
+        if limits := robust_limits([(time, values) for values in parts.values()]):
+            axes.set_ylim(limits)
         axes.set_ylabel(f"${symbol}$")
         _finish(axes, run.window, legend=axes is upper)
     if run.window.edges.size and run.bodies:
@@ -58,7 +59,8 @@ def coefficients(runs: dict[str, Run]) -> Figure:
             axes.plot(*record, f"C{index}", lw=1, label=f"{name}, {DEVELOPING}" if run.window.developing else name)
             if run.window.edges.size:
                 axes.plot([run.window.start, run.window.end], [run.load(axis).mean] * 2, f"C{index}--", lw=1)
-        _robust_limits(axes, records)
+        if limits := robust_limits(records):
+            axes.set_ylim(limits)
         axes.set_ylabel(f"${symbol}$")
         axes.grid(alpha=0.3)
     figure.legend(
@@ -106,14 +108,18 @@ def _finish(axes: Axes, window: Window, *, legend: bool = True) -> None:
         axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=5, frameon=False, fontsize="small", borderpad=0)
 
 
-def _robust_limits(axes: Axes, records: list[tuple[FloatArray, FloatArray]]) -> None:
-    """Scale the ordinate to records without their start, where an impulsive start's forces tower over all else."""
+def robust_limits(records: list[tuple[FloatArray, FloatArray]]) -> tuple[float, float] | None:
+    """Return ends of the ordinate for records without their start, where an impulsive start towers over all else.
+
+    None where there is nothing to go by.
+    """
     long = [(time, values) for time, values in records if len(time) >= 10]
     late = np.concatenate([values[time > time[0] + 0.1 * (time[-1] - time[0])] for time, values in long] or [[]])
     late = late[np.isfinite(late)]
-    if late.size and np.ptp(late) > 0:
-        margin = 0.15 * np.ptp(late)
-        axes.set_ylim(late.min() - margin, late.max() + 2 * margin)
+    if not (late.size and np.ptp(late) > 0):
+        return None
+    margin = 0.15 * np.ptp(late)
+    return float(late.min() - margin), float(late.max() + 2 * margin)
 
 
 def ledger(run: Run) -> Figure:

@@ -64,6 +64,7 @@ def field(
     limit: float | None = None,
     view: tuple[float, float, float, float] | None = None,
     title: str = "",
+    width: float = 9.0,
 ) -> Figure:
     """Picture of a field in 2-D, the bodies in grey.
 
@@ -79,6 +80,8 @@ def field(
         Part of the plane to show [D]; all of it if None.
     title : str, optional
         What stands above the picture, before the time.
+    width : float
+        Width of the figure in inches.
 
     Raises
     ------
@@ -87,7 +90,6 @@ def field(
     """
     field_style(name)
     left, right, bottom, top = part = extent_of(snapshot, spacing, view)
-    width = 9.0
     figure = blank(width, max(2.5, 0.81 * width * (top - bottom) / (right - left) + 0.75), "compressed")
     axes = figure.subplots()
     _draw_field(axes, snapshot, name, spacing, part, limit)
