@@ -227,7 +227,7 @@ def _export(
         typer.Option("--output", "-o", help="file, .vtkhdf, .nc or .csv", show_default="RUN/flow.vtkhdf"),
     ] = None,
 ) -> None:
-    """Write velocity, pressure and vorticity of a snapshot on a regular grid, for other programs.
+    """Write a snapshot of a run on a regular grid, for other programs: velocity, pressure and vorticity.
 
     ParaView 5.12 or later reads vtkhdf; netcdf needs pip install 'alsph[tables]'. Bodies are NaN.
     """
