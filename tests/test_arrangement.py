@@ -240,7 +240,7 @@ def test_the_arrangement_does_not_depend_on_the_unit_of_length(turn):
         carried = thin.carried(shapely.affinity.scale(body, unit, unit, origin=(0, 0)), spacing)
         solid = thin.solid(carried, spacing, 3)
         cells = lattice.lattice(*2 * [lattice.symmetric_centres(24, spacing)])
-        fluid = packing.pack(cells, carried, solid.position, spacing)
+        fluid = packing.pack(cells, packing.Planar(carried), solid.position, spacing)
         found.append([carried.area / unit**2, solid.position / unit, solid.normal, solid.depth / unit, fluid / unit])
     assert all(one == pytest.approx(other, rel=1e-9, abs=1e-9) for one, other in zip(*found, strict=True))
     assert thin.is_symmetric(carried) == (turn == 0) and len(fluid) == pytest.approx(24**2 - 100 * body.area, abs=2)
@@ -248,9 +248,9 @@ def test_the_arrangement_does_not_depend_on_the_unit_of_length(turn):
 
 def test_heights_above_a_body():
     points = np.array([[0.5, 1.5], [0.5, 0.8], [2.0, 2.0], [1.3, 0.5], [-0.45, 0.5]])
-    assert packing._height(SQUARE, points) == pytest.approx([0.5, -0.2, np.sqrt(2), 0.3, 0.45])
-    assert packing._height(SQUARE, points, 0.4) == pytest.approx([np.inf, -0.2, np.inf, 0.3, np.inf])
-    assert packing._around(points, SQUARE, 0.46).tolist() == points[[1, 3, 4]].tolist()
+    assert packing._height(packing.Planar(SQUARE), points) == pytest.approx([0.5, -0.2, np.sqrt(2), 0.3, 0.45])
+    assert packing._height(packing.Planar(SQUARE), points, 0.4) == pytest.approx([np.inf, -0.2, np.inf, 0.3, np.inf])
+    assert packing._around(points, packing.Planar(SQUARE), 0.46).tolist() == points[[1, 3, 4]].tolist()
 
 
 def test_cells_around_a_rectangle_continue_its_lattice():
@@ -268,16 +268,16 @@ def test_the_crowd_is_a_sum_of_gaussians():
 
 
 @pytest.mark.parametrize(
-    ("symmetric", "count", "left"), [(False, 3, [0, 1, 4]), (True, 3, [0, 1, 4]), (True, 4, [0, 1, 2, 3, 4])]
+    ("flips", "count", "left"), [([], 3, [0, 1, 4]), ([(1, -1)], 3, [0, 1, 4]), ([(1, -1)], 4, [0, 1, 2, 3, 4])]
 )
-def test_the_most_crowded_particles_go_with_their_mirror_images(symmetric, count, left):
+def test_the_most_crowded_particles_go_with_their_mirror_images(flips, count, left):
     near = np.array([[0, 0.5], [0, -0.5], [1, 0.04], [1, -0.04], [2, 0.0]])
-    assert packing._thinned(near, np.array([[1.0, 0.0]]), count, 0.1, symmetric).tolist() == near[left].tolist()
+    assert packing._thinned(near, np.array([[1.0, 0.0]]), count, 0.1, flips).tolist() == near[left].tolist()
 
 
 def test_particles_next_to_a_body_are_moved_out_of_it():
     points = np.array([[0.5, 1.1], [0.5, 0.9], [1.5, 0.5], [1.06, 1.08]])
-    cleared = packing._cleared(points, SQUARE, 0.2)
+    cleared = packing._cleared(points, packing.Planar(SQUARE), 0.2)
     assert cleared == pytest.approx(np.array([[0.5, 1.2], [0.5, 1.2], [1.5, 0.5], [1.12, 1.16]]))
     assert points[0, 1] == 1.1
 
@@ -286,18 +286,18 @@ def test_fluid_that_is_even_stays_and_the_rest_moves_apart():
     spacing, body = 0.1, shapely.box(-0.2, -0.2, 0.2, 0.2)
     cells = lattice.lattice(*2 * [lattice.symmetric_centres(20, spacing)])
     solid = cells[lattice.inside(body, cells)]
-    fluid = packing.pack(cells, body, solid, spacing)
+    fluid = packing.pack(cells, packing.Planar(body), solid, spacing)
     assert same(fluid, cells[~lattice.inside(body, cells)])
     wider = shapely.box(-0.25, -0.25, 0.25, 0.25)
     solid = solids.body_layers(wider, spacing, 3).position
-    fluid = packing.pack(cells, wider, solid, spacing)
+    fluid = packing.pack(cells, packing.Planar(wider), solid, spacing)
     assert len(fluid) == 376  # 400 - 25 are not in pairs
-    assert same(fluid, fluid * (1, -1)) and packing._height(wider, fluid).min() > 0.39 * spacing
+    assert same(fluid, fluid * (1, -1)) and packing._height(packing.Planar(wider), fluid).min() > 0.39 * spacing
     assert KDTree(fluid).query(fluid, 2)[0][:, 1].min() > 0.75 * spacing
-    height = packing._height(wider, fluid)
+    height = packing._height(packing.Planar(wider), fluid)
     free = fluid[(height > 0.41 * spacing) & (height < 4 * spacing)]
     offset = (free[:, None] - np.concatenate([fluid, solid])) / spacing
     push = (offset * np.exp(-0.5 * (offset**2).sum(axis=2, keepdims=True) / 0.6**2)).sum(axis=1)
     assert np.hypot(*push.T).max() < 0.006  # a neighbour a spacing off pushes with 0.25
-    far = cells[packing._height(wider, cells) > 4 * spacing]
+    far = cells[packing._height(packing.Planar(wider), cells) > 4 * spacing]
     assert same(fluid[: len(far)], far)

@@ -119,11 +119,12 @@ def test_help_teaches_every_parameter(alsph, case, command):
 def test_plot_in_3d_draws_what_it_can(alsph, tmp_path):
     run = tmp_path / "run"
     assert alsph("run", "taylor_green", "--dimensions=3", "--resolution=8", "--until=0.01", "-o", run)[0] == 0
-    assert alsph("plot", run)[:2] == (
+    drawn = ["kinetic_energy", "ledger", "vorticity", "pressure"]
+    assert alsph("plot", run, "--plane", "y=0.2")[:2] == (
         0,
-        f"{run / 'figures' / 'kinetic_energy.png'}\n{run / 'figures' / 'ledger.png'}\n",
+        "".join(f"{run / 'figures' / name}.png\n" for name in drawn),
     )
-    assert "2-D only" in alsph("plot", run, "--field", "pressure")[2]
+    assert "no fluid there" in alsph("plot", run, "--field", "pressure", "--plane", "y=2")[2]
 
 
 def test_describe(alsph, small_options):

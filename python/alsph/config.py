@@ -188,7 +188,7 @@ def from_tables(tables: dict[str, Any], *folders: Path) -> Config:
     if not isinstance(run, dict):
         raise ConfigError(f"run = {shown(run)}: must be a table, [run]")
     shape = parameters.get("shape")
-    if isinstance(shape, str) and not cases.body.is_name(shape):
+    if isinstance(shape, str) and shape != cases.body_3d.CUBE and not cases.body.is_name(shape):
         parameters["shape"] = _found(shape, folders)
     if isinstance(initial_run := run.get("initial_run"), str):
         run = run | {"initial_run": _found(initial_run, (*folders, Path()))}

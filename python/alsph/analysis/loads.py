@@ -15,7 +15,7 @@ from alsph.geometry.surface import Surface
 
 @dataclass(frozen=True)
 class Load:
-    """A coefficient of a force, F / (½ρU²D), or moment, M / (½ρU²c²), over the averaging window.
+    """A coefficient of a force, F / (½ρU²A), or moment, M / (½ρU²c²), over the averaging window.
 
     Attributes
     ----------

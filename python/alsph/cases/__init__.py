@@ -19,14 +19,18 @@ from alsph.cases.backward_facing_step import BackwardFacingStep
 from alsph.cases.base import Case
 from alsph.cases.bodies import Bodies
 from alsph.cases.body import Body
+from alsph.cases.body_3d import Body3D
 from alsph.cases.cavity import Cavity
 from alsph.cases.channel import Channel
 from alsph.cases.couette import Couette
 from alsph.cases.cylinder import Cylinder
 from alsph.cases.cylinder_pair import CylinderPair
+from alsph.cases.pipe import Pipe
 from alsph.cases.poiseuille import Poiseuille
 from alsph.cases.pressure_jump import PressureJump
 from alsph.cases.pulsating_channel import PulsatingChannel
+from alsph.cases.spatial import Spatial
+from alsph.cases.sphere import Sphere
 from alsph.cases.taylor_green import TaylorGreen
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain, SolidBody
@@ -35,8 +39,8 @@ from alsph.parameters import suggest
 CASES: dict[str, type[Case]] = {
     case.name: case
     for case in (
-        *(Cylinder, CylinderPair, Body, BackwardFacingStep, Cavity),
-        *(Poiseuille, Couette, PulsatingChannel, PressureJump, TaylorGreen),
+        *(Cylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Cavity),
+        *(Poiseuille, Couette, PulsatingChannel, Pipe, PressureJump, TaylorGreen),
     )
 }
 
@@ -45,6 +49,7 @@ __all__ = [
     "BackwardFacingStep",
     "Bodies",
     "Body",
+    "Body3D",
     "Case",
     "Cavity",
     "Channel",
@@ -52,10 +57,13 @@ __all__ = [
     "Cylinder",
     "CylinderPair",
     "Domain",
+    "Pipe",
     "Poiseuille",
     "PressureJump",
     "PulsatingChannel",
     "SolidBody",
+    "Spatial",
+    "Sphere",
     "TaylorGreen",
     "find",
 ]

@@ -131,7 +131,7 @@ class Case(Dimensional):
     @property
     def space_dimensions(self) -> int:
         """Number of space dimensions, 2 or 3."""
-        return 2
+        return self.in_space
 
     @property
     def largest_time_step(self) -> float:
@@ -143,6 +143,11 @@ class Case(Dimensional):
     @property
     def thickness(self) -> float:
         """Extent of the body that drag and lift are those of, across the stream [D]."""
+        return 1.0
+
+    @property
+    def reference_area(self) -> float:
+        """What force coefficients are formed with: a length in 2-D [D], an area in 3-D [D²]."""
         return 1.0
 
     def body_force(self) -> list[float]:
@@ -317,6 +322,14 @@ class Case(Dimensional):
         return []
 
     @property
+    def middle(self) -> FloatArray:
+        """Point (d,) that slices for pictures go through in 3-D [D]: the centre of the body, or of the domain."""
+        if self.coefficient_bodies:
+            return np.array(self.checked_bodies[0].center, float)
+        domain = self.checked_domain
+        return np.asarray(np.mean([domain.lower, domain.upper], axis=0))
+
+    @property
     def chord(self) -> float:
         """Length c that moment coefficients are formed with [D]."""
         return 1.0
@@ -444,7 +457,7 @@ class Case(Dimensional):
 
     def problem(self, state: dict[str, Any]) -> Problem:
         """Return this case with the given state, for instance one from a checkpoint."""
-        return Problem(self.settings(), state, self.coefficient_bodies)
+        return Problem(self.settings(), state, self.coefficient_bodies, self.reference_area)
 
     def simulation(self, threads: int | None = None, initial_run: str | Path | None = None) -> Simulation:
         """Return a :class:`alsph.Simulation` of this case, at its start.

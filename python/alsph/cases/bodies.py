@@ -19,7 +19,7 @@ from alsph.cases.channel import Channel
 from alsph.cases.remarks import TOO_THIN
 from alsph.errors import ConfigError
 from alsph.geometry.outline import Outline
-from alsph.geometry.packing import pack
+from alsph.geometry.packing import Planar, pack
 from alsph.geometry.solids import Solid
 from alsph.geometry.surface import Surface, along
 from alsph.geometry.thin import carried, solids
@@ -115,7 +115,7 @@ class Bodies(Channel):
         """Return fluid evenly spaced around the bodies, as much as they leave of the cells."""
         position = np.concatenate([solid.position for solid in self._solids])
         bodies = shapely.union_all(self.carried)
-        return np.asarray(self.centre + pack(cells - self.centre, bodies, position, self.particle_spacing))
+        return np.asarray(self.centre + pack(cells - self.centre, Planar(bodies), position, self.particle_spacing))
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:

@@ -15,7 +15,7 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.base import Case
-from alsph.geometry.domain import Domain, SolidBody
+from alsph.geometry.domain import Boundary, Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, lattice, symmetric_centres
 from alsph.geometry.particles import Kind, join, particles
 from alsph.geometry.solids import Solid
@@ -31,6 +31,8 @@ class Channel(Case):
     velocity_max: ClassVar[float] = 1.5
     of_the_start: ClassVar[tuple[str, ...]] = ("perturbation",)
     body_name: ClassVar[str]
+    across: ClassVar[tuple[str, ...]] = ("height",)
+    """Parameters that are the extents of the channel along y, and along z in 3-D."""
 
     reynolds: float = Field(default=200.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, gt=0, description="particles per reference length, D/Δx; at least 8 [-]")
@@ -53,19 +55,22 @@ class Channel(Case):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        for name, room in (
-            ("height", self.height / 2),
-            ("upstream", self.upstream),
-            ("length", self.length - self.upstream),
-        ):
-            if room < 1:
+        room = {name: getattr(self, name) / 2 for name in self.across}
+        for name, left in (room | {"upstream": self.upstream, "length": self.length - self.upstream}).items():
+            if left < 1:
+                known = ", ".join(f"{each} {getattr(self, each):g}" for each in ("length", *self.across, "upstream"))
                 raise ValueError(
                     f"{name} = {getattr(self, name):g}: the {self.body_name} does not fit; leave at least 1 D from "
-                    f"centre to each side (length {self.length:g}, height {self.height:g}, upstream {self.upstream:g})"
+                    f"centre to each side ({known})"
                 )
-        self.whole_cells("length", self.length)
-        self.whole_cells("height", self.height)
+        for name in ("length", *self.across):
+            self.whole_cells(name, getattr(self, name))
         return self
+
+    @property
+    def section(self) -> FloatArray:
+        """Extents of the channel across the stream (d - 1,) [D]."""
+        return np.array([getattr(self, name) for name in self.across])
 
     @property
     def coefficient_bodies(self) -> list[str]:
@@ -98,7 +103,7 @@ class Channel(Case):
     def remarks(self) -> list[str]:
         """Return what is to be said of the resolution, the method and the channel."""
         behind = self.length - self.upstream - self.bounds[2]
-        return [*super().remarks(), *remarks.channel(self.blocked, self.upstream, behind, self.height)]
+        return [*super().remarks(), *remarks.channel(self.blocked, self.upstream, behind, self.blockage, self.slowed)]
 
     @property
     def blocked(self) -> float:
@@ -107,35 +112,47 @@ class Channel(Case):
         return top - bottom
 
     @property
+    def blockage(self) -> float:
+        """Share of the channel's section that the body blocks [-]."""
+        return self.blocked / self.height
+
+    @property
+    def slowed(self) -> float:
+        """Share by which a cylinder of the body's extent across the stream slows the stream at the inlet [-]."""
+        return (0.5 * self.blocked / self.upstream) ** 2
+
+    @property
     def default_until(self) -> float:
         """Some ten shedding periods."""
         return 60.0
 
     @property
     def centre(self) -> FloatArray:
-        """Centre of the body (2,) [D]."""
-        return np.array([self.upstream, 0.0])
+        """Centre of the body (d,) [D]."""
+        return np.array([self.upstream, *0 * self.section])
 
     def domain(self) -> Domain:
-        """Return the channel: inlet at x = 0, outlet at x = length, free-slip walls at y = ± height/2."""
-        half = self.height / 2
-        return Domain((0, -half), (self.length, half), [("inlet", "outlet"), ("slip", "slip")])
+        """Return the channel: inlet at x = 0, outlet at x = length, free-slip walls at y = ± height/2 and z alike."""
+        half = self.section / 2
+        walls: list[tuple[Boundary, Boundary]] = [("slip", "slip")] * len(half)
+        return Domain((0, *-half), (self.length, *half), [("inlet", "outlet"), *walls])
 
     def bodies(self) -> list[SolidBody]:
         """Return the bodies, at rest; their torques are about the centre."""
-        return [SolidBody(name, (self.upstream, 0)) for name in self.coefficient_bodies]
+        return [SolidBody(name, tuple(self.centre)) for name in self.coefficient_bodies]
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a uniform lattice around the body's solid particles, impulsively started."""
         spacing = self.particle_spacing
-        rows = symmetric_centres(self.whole_cells("height", self.height), spacing)
+        rows = [symmetric_centres(self.whole_cells(name, getattr(self, name)), spacing) for name in self.across]
         buffer = cell_centres(self.buffer_columns, spacing)
-        channel = lattice(cell_centres(self.whole_cells("length", self.length), spacing), rows)
+        channel = lattice(cell_centres(self.whole_cells("length", self.length), spacing), *rows)
+        stream = np.eye(self.space_dimensions)[0]
         fluid = self.fluid(channel)
         return join(
             particles(Kind.FLUID, fluid, self._initial_velocity(fluid)),
-            particles(Kind.INLET, lattice(-buffer, rows), [1.0, 0.0]),
-            particles(Kind.OUTLET, lattice(self.length + buffer, rows), [1.0, 0.0]),
+            particles(Kind.INLET, lattice(-buffer, *rows), stream),
+            particles(Kind.OUTLET, lattice(self.length + buffer, *rows), stream),
             *(solid.moved(self.centre).particles(body=index) for index, solid in enumerate(self.solids())),
         )
 
@@ -161,6 +178,6 @@ class Channel(Case):
 
     def _initial_velocity(self, position: FloatArray) -> FloatArray:
         """Uniform flow and a Gaussian vortex (divergence-free) about the body, fastest 0.6 D from its centre."""
-        x, y = ((position - self.centre) / 0.6).T
-        swirl = self.perturbation * np.exp(0.5 * (1 - x**2 - y**2))
-        return np.stack([1.0 - swirl * y, swirl * x], axis=1)
+        x, y, *z = ((position - self.centre) / 0.6).T
+        swirl = self.perturbation * np.exp(0.5 * (1 - x**2 - y**2 - sum(each**2 for each in z)))
+        return np.stack([1.0 - swirl * y, swirl * x, *(0 * each for each in z)], axis=1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -66,6 +66,9 @@ DIFFUSION = {"wcsph": 0.1, "edac": 0.5}
 
 class Method(Parameters):
     """How a flow is computed: scheme, time step, iterations, operators, shift and walls."""
+
+    in_space: ClassVar[int] = 2
+    """Number of space dimensions of a case without a parameter for it."""
 
     scheme: Literal["alsph", "wcsph", "edac"] | None = Field(
         default=None,
@@ -189,7 +192,7 @@ class Method(Parameters):
     @classmethod
     def _what_follows_from_others(cls, values: dict[str, Any]) -> dict[str, Any]:
         if values.get("shift_coefficient") is None:
-            strain = 0.25 if values.get("dimensions") == 3 else 0.75  # in 3-D more neighbours push
+            strain = 0.25 if values.get("dimensions", cls.in_space) == 3 else 0.75  # in 3-D more neighbours push
             kind = values.get("shifting")
             values = values | {"shift_coefficient": strain if kind in (None, "strain") else 0.04}
         if values.get("wall_pressure") is None:

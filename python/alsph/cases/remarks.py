@@ -14,6 +14,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from alsph.geometry.thin import THINNEST, carried, thickness
+from alsph.geometry.volume import Volume
 
 LAYER = 1.2
 """Thickness of the boundary layer at the front of a cylinder over √(νD/U): 2.4 √(ν/a) in stagnation-point flow
@@ -48,6 +49,9 @@ TOO_THIN = "too thin"
 
 LEAST_LEFT = 0.5
 """Share of its area below which what the resolution carries of a body is no longer that body."""
+
+MOST_LEFT = 0.98
+"""Share of its volume below which a body in space has thin parts to speak of; a cube's edges take less."""
 
 THICK = 8.0
 """Thickness of a body [Δx] from which its recorded loads have met the momentum balance within 3 % (docs/results.md)."""
@@ -142,7 +146,7 @@ def penalty(constant: float) -> list[str]:
     return [f"compressible: {text}; take a smaller courant, or a larger penalty_constant"]
 
 
-def channel(size: float, inlet: float, outlet: float, height: float) -> list[str]:
+def channel(size: float, inlet: float, outlet: float, share: float, slowed: float) -> list[str]:
     """Remark on a channel that ends, or is closed, too near a body.
 
     Parameters
@@ -151,19 +155,20 @@ def channel(size: float, inlet: float, outlet: float, height: float) -> list[str
         The body's extent across the stream [D].
     inlet, outlet : float
         Distances of the inlet from its centre and of the outlet from its back [D].
-    height : float
-        Height of the channel [D].
+    share : float
+        Share of the channel's section that the body blocks.
+    slowed : float
+        Share by which it slows the stream at the inlet.
     """
     remarks = []
     if outlet < OUTLET * size:
         text = f"outlet {outlet:.3g} D behind the body; vortices leave as they form, which has made runs break down"
         remarks.append(f"short channel: {text}, use a larger length")
-    slowed = (0.5 * size / inlet) ** 2
     if slowed > SLOWED:
         text = f"inlet {inlet:.3g} D before the body, which slows the stream there by about {100 * slowed:.0f} %"
         remarks.append(f"short channel: {text}; the inflow is uniform all the same, use a larger upstream")
-    if size / height > LARGEST_BLOCKAGE:
-        text = f"the body blocks {100 * size / height:.0f} % of it; its coefficients are not those of unbounded flow"
+    if share > LARGEST_BLOCKAGE:
+        text = f"the body blocks {100 * share:.0f} % of it; its coefficients are not those of unbounded flow"
         remarks.append(f"narrow channel: {text}")
     return remarks
 
@@ -232,6 +237,21 @@ def thin(name: str, shape: Polygon, left: Polygon | MultiPolygon, spacing: float
     if thick < 0.99 * THICK * spacing:
         known = "lift and drag were found off by 20 to 30 % below 3 Δx, by 4 % at 5 Δx"
         found.append(f"thin body: {thick / spacing:.2g} Δx at its thickest; {known}; use a finer resolution")
+    return found
+
+
+def thin_in_space(name: str, body: Volume, spacing: float) -> list[str]:
+    """Remark on a body in space too thin for the resolution, or with parts that are (Δx in D)."""
+    share, thick = body.left(THINNEST * spacing), body.thickness / spacing
+    if share < LEAST_LEFT:
+        text = f"the {name} is at most {thick:.3g} Δx thick, only {100 * share:.0f} % of it {THINNEST:g} Δx and more"
+        return [f"{TOO_THIN}: {text}; use a finer resolution"]
+    found = []
+    if share < MOST_LEFT:
+        text = f"{100 * (1 - share):.2g} % of the {name} is thinner than {THINNEST:g} Δx"
+        found.append(f"thin parts: {text}; each face there has half a wall, and loads are uncertain")
+    if thick < 0.95 * THICK:  # it is known to some per cent
+        found.append(f"thin body: {thick:.2g} Δx at its thickest; use a finer resolution")
     return found
 
 

@@ -39,6 +39,11 @@ Walltime = Annotated[
 
 Retry = Annotated[int, typer.Option(help="how often a run that breaks down goes back and on with half the time step")]
 
+Plane = Annotated[
+    str | None,
+    typer.Option(help="plane of the fields in 3-D, z=0.5 or y [D]", show_default="z, through the middle of the body"),
+]
+
 Threads = Annotated[int | None, typer.Option(help="number of threads", show_default="the run's")]
 
 WORDS = {int: "a whole number", float: "a number"}

@@ -13,7 +13,7 @@ from rich.progress import Progress
 
 from alsph import plotting
 from alsph.cases.source import shown_name
-from alsph.cli.options import Retry, RunPath, Threads, Walltime
+from alsph.cli.options import Plane, Retry, RunPath, Threads, Walltime
 from alsph.cli.terminal import complain, exit_codes, say, say_table
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder.durable import check_folder
@@ -127,7 +127,7 @@ def _plot(
     path: RunPath,
     field: Annotated[
         list[str] | None,
-        typer.Option(help="field to draw, may be repeated", show_default="vorticity and pressure; none in 3-D"),
+        typer.Option(help="field to draw, may be repeated", show_default="vorticity and pressure"),
     ] = None,
     time: Annotated[float | None, typer.Option(help="time of the fields [D/U]", show_default="the last")] = None,
     body: Annotated[
@@ -136,6 +136,7 @@ def _plot(
     ] = None,
     kind: Annotated[str, typer.Option("--format", metavar="png|pdf|svg", help="format of the figures")] = "png",
     dpi: Annotated[int, typer.Option(min=10, max=2400, help="pixels an inch of png")] = 100,
+    plane: Plane = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="folder for the figures", show_default="RUN/figures")
     ] = None,
@@ -147,11 +148,13 @@ def _plot(
     """
     choose("format", kind, KINDS)
     run = Run(path)
-    names: list[Any] = field or ([] if run.case.get("dimensions") == 3 else ["vorticity", "pressure"])
+    names: list[Any] = field or ["vorticity", "pressure"]
     for name in names:
         plotting.field_style(name)
     figures = output or path / "figures"
-    drawings = _drawings(run, body or []) | {name: functools.partial(run.plot_field, name, time) for name in names}
+    drawings = _drawings(run, body or []) | {
+        name: functools.partial(run.plot_field, name, time, plane=plane) for name in names
+    }
     if not output:
         check_folder(figures)
     figures.mkdir(parents=True, exist_ok=True)
@@ -192,6 +195,7 @@ def _animate(
     every: Annotated[int, typer.Option(help="take one snapshot of so many")] = 1,
     fps: Annotated[float, typer.Option(help="pictures a second")] = 10.0,
     limit: Annotated[float | None, typer.Option(help="end of the colour scale", show_default="from the fields")] = None,
+    plane: Plane = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="file, .gif, .mp4 or .webm", show_default="RUN/figures/FIELD.gif"),
@@ -211,7 +215,7 @@ def _animate(
         def progress(done: int, count: int) -> None:
             bar.update(task, completed=done, total=count)
 
-        film = run.animate(name, output, every=every, fps=fps, limit=limit, progress=progress, **times)
+        film = run.animate(name, output, every=every, fps=fps, limit=limit, plane=plane, progress=progress, **times)
     say(film)
 
 

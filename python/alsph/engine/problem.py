@@ -19,11 +19,14 @@ class Problem:
         The particles, one array a property, and optionally ``time``, ``step``, ``mass_in``, ``mass_out``.
     coefficient_bodies
         Names of the bodies whose force coefficients are reported, all together.
+    reference_area
+        A of these coefficients F / (½ρU²A), a length in 2-D [D], an area in 3-D [D²].
     """
 
     settings: dict[str, Any]
     state: dict[str, Any]
     coefficient_bodies: Sequence[str] = ()
+    reference_area: float = 1.0
 
     @property
     def dimensions(self) -> int:

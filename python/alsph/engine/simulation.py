@@ -328,12 +328,13 @@ class Simulation:
         return rows
 
     def _coefficients(self, rows: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-        """Drag and lift coefficients of the case's bodies with their parts: force / (½ρU²D), eqs. (21) and (22)."""
+        """Drag and lift coefficients of the case's bodies with their parts: force / (½ρU²A), eqs. (21) and (22)."""
         names = [body["name"] for body in self.problem.settings["bodies"]]
         bodies = [names.index(name) for name in self.problem.coefficient_bodies if name in names]
         if not bodies:
             return {}
-        pressure, viscous = (2 * rows[f"{part}_force"][:, bodies].sum(axis=1) for part in ("pressure", "viscous"))
+        scale = 2 / self.problem.reference_area
+        pressure, viscous = (scale * rows[f"{part}_force"][:, bodies].sum(axis=1) for part in ("pressure", "viscous"))
         columns: dict[str, NDArray[Any]] = {}
         for axis, name in enumerate(("drag", "lift")):
             columns |= {

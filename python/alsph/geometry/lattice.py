@@ -15,6 +15,11 @@ def lattice(*axes: FloatArray) -> FloatArray:
     return np.stack([grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")], axis=1)
 
 
+def extruded(columns: FloatArray, points: FloatArray) -> FloatArray:
+    """Return the points (k n, 3) of a plane (n, 2), as y and z, at each of the places x (k,)."""
+    return np.concatenate([np.insert(points, 0, x, axis=1) for x in columns])
+
+
 def cell_centres(count: int, spacing: float) -> FloatArray:
     """Return the centres of `count` cells that start at 0: ``(i + 1/2) spacing``."""
     return spacing * (np.arange(count, dtype=np.float64) + 0.5)

@@ -1,5 +1,12 @@
 """The fluid around a body at the start: as much as there is room for, none on the surface, evenly spaced."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -19,56 +26,115 @@ CLEARANCE = 0.4
 WIDTH = 0.6
 """Width of the Gaussian by which particles repel each other [Δx]."""
 
-SWEEPS = 200
+SWEEPS = {2: 200, 3: 60}
+"""Moves, by dimension: more neighbours come to rest sooner."""
+
 STEP = 0.1
 EVEN = 1e-6
 """Displacement [Δx] below which particles count as evenly spaced: on a lattice that fits the body they stay."""
 
 
-def pack(cells: FloatArray, body: Polygon | MultiPolygon, solid: FloatArray, spacing: float) -> FloatArray:
-    """Return fluid particles (m, 2) around a body, their number times Δx² being the area that it leaves.
+class Region(Protocol):
+    """What of a body the fluid around it depends on, in d dimensions."""
+
+    @property
+    def corners(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper corner (d,) of a box around it."""
+
+    @property
+    def volume(self) -> float:
+        """Its area or volume."""
+
+    @property
+    def flips(self) -> Sequence[FloatArray]:
+        """Factors (d,) of the coordinates of mirror images that are the body itself."""
+
+    def height(self, points: FloatArray) -> FloatArray:
+        """Return how far points (n, d) lie outside (n,), negative inside."""
+
+    def feet(self, points: FloatArray) -> FloatArray:
+        """Return the points (n, d) of its surface that are nearest to points outside."""
+
+
+@dataclass(frozen=True, eq=False)
+class Planar:
+    """A :class:`Region` of the plane."""
+
+    body: Polygon | MultiPolygon
+
+    @property
+    def corners(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper corner (2,)."""
+        lower, upper = np.split(np.array(self.body.bounds), 2)
+        return lower, upper
+
+    @property
+    def volume(self) -> float:
+        """Its area."""
+        return float(self.body.area)
+
+    @cached_property
+    def flips(self) -> Sequence[FloatArray]:
+        """That about y = 0, if it is its own image."""
+        return [np.array([1.0, -1.0])] if is_symmetric(self.body) else []
+
+    def height(self, points: FloatArray) -> FloatArray:
+        """Return how far points (n, 2) lie outside (n,), negative inside."""
+        distance = shapely.distance(self.body.boundary, shapely.points(points))
+        return np.asarray(np.where(inside(self.body, points), -distance, distance))
+
+    def feet(self, points: FloatArray) -> FloatArray:
+        """Return the points (n, 2) of its outline that are nearest to points (n, 2)."""
+        lines = shapely.shortest_line(shapely.points(points), self.body.boundary)
+        return np.asarray(shapely.get_coordinates(lines)[1::2])
+
+
+def pack(cells: FloatArray, body: Region, solid: FloatArray, spacing: float) -> FloatArray:
+    """Return fluid particles (m, d) around a body, their number times Δx^d being the volume that it leaves.
 
     Those next to the body are taken from where they are most crowded until the number is right, and then repel each
-    other until they are evenly spaced. Around a body that is its own mirror image about y = 0 they are so, too; their
-    number may then be one off.
+    other until they are evenly spaced. Around a body that is its own mirror image they are so, too; their number may
+    then be a few off.
 
     Parameters
     ----------
     cells
-        Cell centres (n, 2) of the fluid and the body, which fill a rectangle.
+        Cell centres (n, d) of the fluid and the body, which fill a box.
     body
         The body.
     solid
-        Its solid particles (k, 2).
+        Its solid particles (k, d).
     spacing
         Particle spacing Δx.
     """
-    symmetric = is_symmetric(body)
-    count = round(len(cells) - body.area / spacing**2)
+    count = round(len(cells) - body.volume / spacing ** cells.shape[1])
     height = _height(body, cells, BAND * spacing)
     far, near = cells[height > BAND * spacing], cells[(height <= BAND * spacing) & (height > -spacing)]
     sides = _around(_beyond(cells, spacing), body, 2 * BAND * spacing)
     fixed = np.concatenate([_around(far, body, 3 * BAND * spacing), sides, solid])
-    near = _thinned(near, fixed, count - len(far), spacing, symmetric)
-    return np.asarray(np.concatenate([far, _spread(near, fixed, body, spacing, symmetric)]))
+    near = _thinned(near, fixed, count - len(far), spacing, body.flips)
+
+    def cleared(points: FloatArray) -> FloatArray:
+        return _cleared(points, body, CLEARANCE * spacing)
+
+    return np.asarray(np.concatenate([far, spread(near, fixed, spacing, cleared, body.flips)]))
 
 
-def _height(body: Polygon | MultiPolygon, points: FloatArray, reach: float = np.inf) -> FloatArray:
-    """Return how far points (n, 2) lie outside the body, negative inside; infinite beyond `reach` of its bounds."""
-    lower, upper = np.split(np.array(body.bounds), 2)
+def _height(body: Region, points: FloatArray, reach: float = np.inf) -> FloatArray:
+    """Return how far points (n, d) lie outside the body, negative inside; infinite beyond `reach` of its bounds."""
+    lower, upper = body.corners
     near = ((points >= lower - reach) & (points <= upper + reach)).all(axis=1)
-    distance = shapely.distance(body.boundary, shapely.points(points[near]))
     height = np.full(len(points), np.inf)
-    height[near] = np.where(inside(body, points[near]), -distance, distance)
+    height[near] = body.height(points[near])
     return height
 
 
-def _around(points: FloatArray, body: Polygon | MultiPolygon, reach: float) -> FloatArray:
+def _around(points: FloatArray, body: Region, reach: float) -> FloatArray:
     return np.asarray(points[_height(body, points, reach) < reach])
 
 
 def _beyond(cells: FloatArray, spacing: float) -> FloatArray:
-    """Return the cells around a rectangle of cells, which keep the particles at its sides within it."""
+    """Return the cells around a box of cells, which keep the particles at its sides within it."""
     lower, upper = cells.min(axis=0), cells.max(axis=0)
     counts, middle = np.rint((upper - lower) / spacing).astype(int) + 1, (lower + upper) / 2
     margin = int(np.ceil(4 * WIDTH))
@@ -76,24 +142,29 @@ def _beyond(cells: FloatArray, spacing: float) -> FloatArray:
     return np.asarray(points[(np.abs(points - middle) > (upper - lower + spacing) / 2).any(axis=1)])
 
 
-def _mirror(points: FloatArray) -> NDArray[np.intp]:
-    """Return the index of the mirror image about y = 0 of each point (n, 2)."""
-    return np.asarray(neighbour_tree(points).query(points * (1.0, -1.0))[1])
+def _partners(points: FloatArray, flips: Sequence[FloatArray]) -> list[NDArray[np.intp]]:
+    """Return the indices of the mirror images of the points (n, d), by flip."""
+    tree = neighbour_tree(points)
+    return [np.asarray(tree.query(points * flip)[1]) for flip in flips]
 
 
-def _thinned(near: FloatArray, fixed: FloatArray, count: int, spacing: float, symmetric: bool) -> FloatArray:
+def _thinned(
+    near: FloatArray, fixed: FloatArray, count: int, spacing: float, flips: Sequence[FloatArray]
+) -> FloatArray:
     """Take away the most crowded particles, with their mirror images, until `count` are left."""
     tree = neighbour_tree(near)
-    partner = _mirror(near) if symmetric else np.arange(len(near))
+    partners = _partners(near, flips)
     crowd = _weights(near, np.concatenate([near, fixed]), spacing)
     kept = np.ones(len(near), bool)
     while (surplus := int(kept.sum()) - count) > 0:
         # Of equals the one farthest back in the list, so that rounding does not choose.
         most = int(np.flatnonzero(kept & (crowd > crowd[kept].max() - 1e-9))[-1])
-        both = {most, int(partner[most])}
-        if len(both) > surplus:
+        images = {most}
+        for partner in partners:
+            images |= {int(partner[image]) for image in images}
+        if len(images) > surplus:
             break
-        for gone in both:
+        for gone in images:
             kept[gone] = False
             around = np.array(tree.query_ball_point(near[gone], 4 * WIDTH * spacing))
             crowd[around] -= _gaussian(near[around] - near[gone], spacing)
@@ -110,35 +181,54 @@ def _weights(points: FloatArray, others: FloatArray, spacing: float) -> FloatArr
     return np.array([_gaussian(others[j] - point, spacing).sum() for point, j in zip(points, near, strict=True)])
 
 
-def _spread(
-    near: FloatArray, fixed: FloatArray, body: Polygon | MultiPolygon, spacing: float, symmetric: bool
+def spread(
+    near: FloatArray,
+    fixed: FloatArray,
+    spacing: float,
+    held: Callable[[FloatArray], FloatArray],
+    flips: Sequence[FloatArray],
 ) -> FloatArray:
-    """Let the particles repel each other, and the solid and far ones them."""
-    partner = _mirror(near) if symmetric else np.arange(len(near))
-    flip = np.array([1.0, -1.0 if symmetric else 1.0])
-    reach = 4 * WIDTH * spacing
-    for _ in range(SWEEPS):
+    """Let particles repel each other until they are evenly spaced.
+
+    Parameters
+    ----------
+    near, fixed
+        The particles (n, d), and others (k, d) that repel them.
+    spacing
+        Particle spacing Δx.
+    held
+        Puts the particles back where they may be, after each move.
+    flips
+        Factors (d,) of the coordinates of mirror images that the arrangement is to stay of itself.
+
+    Returns
+    -------
+    ndarray, shape (n, d)
+    """
+    partners = _partners(near, flips)
+    d = near.shape[1]
+    reach, stiffness = 4 * WIDTH * spacing, (np.sqrt(2 * np.pi) * WIDTH) ** (d - 2)
+    for _ in range(SWEEPS[d]):
         everyone = np.concatenate([near, fixed])
         pairs = neighbour_tree(near).sparse_distance_matrix(neighbour_tree(everyone), reach, output_type="coo_matrix")
         offset = near[pairs.row] - everyone[pairs.col]
         push = offset * _gaussian(offset, spacing)[:, None]
-        force = np.stack([np.bincount(pairs.row, push[:, axis], len(near)) for axis in range(2)], axis=1)
-        move = STEP * force / WIDTH
-        size = np.hypot(*move.T)[:, None]
+        force = np.stack([np.bincount(pairs.row, push[:, axis], len(near)) for axis in range(d)], axis=1)
+        move = STEP / stiffness * force / WIDTH
+        size = np.hypot.reduce(move, axis=1)[:, None]
         if size.max() < EVEN * spacing:
             break
-        near = near + move * np.minimum(1, 0.1 * spacing / np.maximum(size, 1e-300))
-        near = _cleared(near, body, CLEARANCE * spacing)
-        near = 0.5 * (near + near[partner] * flip) if symmetric else near
+        near = held(near + move * np.minimum(1, 0.1 * spacing / np.maximum(size, 1e-300)))
+        for partner, flip in zip(partners, flips, strict=True):
+            near = 0.5 * (near + near[partner] * flip)
     return near
 
 
-def _cleared(points: FloatArray, body: Polygon | MultiPolygon, least: float) -> FloatArray:
+def _cleared(points: FloatArray, body: Region, least: float) -> FloatArray:
     """Move points that are nearer than `least` to the body out to that distance."""
-    height = _height(body, points)
+    height = _height(body, points, least)
     low = np.flatnonzero(height < least)
-    feet = shapely.get_coordinates(shapely.shortest_line(shapely.points(points[low]), body.boundary))[1::2]
-    outward = (points[low] - feet) / height[low][:, None]
+    feet = body.feet(points[low])
     points = points.copy()
-    points[low] = feet + least * outward
+    points[low] = feet + least * ((points[low] - feet) / height[low][:, None])
     return points

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from shapely import Polygon
 
 from alsph.arrays import FloatArray
-from alsph.geometry.lattice import cell_centres, cells, inside
+from alsph.geometry.lattice import cell_centres, cells, extruded, inside
 from alsph.geometry.particles import Kind, neighbour_tree, particles
 
 
@@ -42,6 +42,11 @@ class Solid:
         """Return the particles moved by `offset` (2,)."""
         return Solid(self.position + offset, self.normal, self.depth)
 
+    def extruded(self, columns: FloatArray) -> Solid:
+        """Return the particles of a plane, as y and z, at each of the places x (k,)."""
+        normal = extruded(np.zeros(len(columns)), self.normal)
+        return Solid(extruded(columns, self.position), normal, np.tile(self.depth, len(columns)))
+
     def mirrored(self) -> Solid:
         """Return the mirror images of the particles about y = 0."""
         flip = np.array([1.0, -1.0])
@@ -52,22 +57,23 @@ class Solid:
         return particles(Kind.SOLID, self.position, velocity, body=body, normal=self.normal, depth=self.depth)
 
 
-def cylinder_rings(radius: float, spacing: float, layers: int) -> Solid:
+def cylinder_rings(radius: float, spacing: float, layers: int, side: int = 1) -> Solid:
     """Place particles on concentric rings about 0 at depths of 1/2, 3/2, ... spacings below the surface.
 
-    The upper half is generated and mirrored, so that the arrangement is exactly symmetric about y = 0.
+    The upper half is generated and mirrored, so that the arrangement is exactly symmetric about y = 0. `side` is 1 if
+    the fluid is around the circle, -1 if it is in it.
     """
     normals, depths = [], []
     for depth in cell_centres(layers, spacing):
-        if depth >= radius:
+        if side * depth >= radius:
             break
-        half = max(2, round(np.pi * (radius - depth) / spacing))
+        half = max(2, round(np.pi * (radius - side * depth) / spacing))
         angle = (np.arange(half) + 0.5) * (np.pi / half)
         upper = np.stack([np.cos(angle), np.sin(angle)], axis=1)
         normals.append(np.concatenate([upper, upper * (1.0, -1.0)]))
         depths.append(np.full(2 * half, depth))
     normal, depth = np.concatenate(normals), np.concatenate(depths)
-    return Solid(normal * (radius - depth)[:, None], normal, depth)
+    return Solid(normal * (radius - side * depth)[:, None], side * normal, depth)
 
 
 def walls(region: Polygon, spacing: float, layers: int) -> Solid:

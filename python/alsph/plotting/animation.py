@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from alsph.analysis.record import Record
 from alsph.errors import ConfigError
 from alsph.folder.durable import check_target, replacing
+from alsph.geometry.plane import Plane
 from alsph.plotting import pictures
 from alsph.plotting.style import remark
 from alsph.text import shown
@@ -59,12 +60,13 @@ def animate(
     view: tuple[float, float, float, float] | None = None,
     title: str = "",
     said: str = "",
+    plane: Plane | None = None,
     progress: Callable[[int, int], None] = lambda done, count: None,
 ) -> None:
     """Make a film of a field; see :meth:`alsph.Run.animate`.
 
-    `title` stands above each picture and `said` below; `progress` is called with the number of pictures that are done,
-    and of all.
+    `title` stands above each picture and `said` below; `plane` is that of a run in 3-D; `progress` is called with the
+    number of pictures that are done, and of all.
     """
     numbers = {"start": start, "end": end, "every": every, "fps": fps}
     if wrong := [what for what, value in numbers.items() if not isinstance(value, int | float | np.number)]:
@@ -82,14 +84,16 @@ def animate(
     times = [time for time in run.times if start <= time <= end][:: int(every)]
     if len(times) < 2:
         raise ConfigError(f"a film needs two snapshots or more, and there are {len(times)}; lower output_interval")
-    view = pictures.extent_of(run.snapshot(times[0]), run.spacing, view)
+    view = pictures.extent_of(run.snapshot(times[0]), run.spacing, view, plane)
     if limit is None:
         chosen = sorted({times[round(k)] for k in np.linspace(0, len(times) - 1, SCALED_BY)})
-        limit = max(pictures.colour_limit(run.snapshot(time), name, run.spacing, view) for time in chosen)
+        limit = max(pictures.colour_limit(run.snapshot(time), name, run.spacing, view, plane) for time in chosen)
 
     def frames() -> Iterator[Frame]:
         for done, time in enumerate(times, 1):
-            figure = pictures.field(run.snapshot(time), name, run.spacing, limit=limit, view=view, title=title)
+            figure = pictures.field(
+                run.snapshot(time), name, run.spacing, limit=limit, view=view, title=title, plane=plane
+            )
             remark(figure, said)
             yield _pixels(figure)
             progress(done, len(times))

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alsph.analysis import sampling
-from alsph.arrays import FloatArray
+from alsph.arrays import AXES, FloatArray
 from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind, Snapshot
+from alsph.geometry.plane import Plane
 from alsph.parameters import suggest
 from alsph.plotting.style import TIME_LABEL, blank
 from alsph.text import shown
@@ -65,8 +66,9 @@ def field(
     view: tuple[float, float, float, float] | None = None,
     title: str = "",
     width: float = 9.0,
+    plane: Plane | None = None,
 ) -> Figure:
-    """Picture of a field in 2-D, the bodies in grey.
+    """Picture of a field in 2-D or along a plane, the bodies in grey.
 
     Parameters
     ----------
@@ -82,18 +84,21 @@ def field(
         What stands above the picture, before the time.
     width : float
         Width of the figure in inches.
+    plane : Plane, optional
+        The plane in 3-D.
 
     Raises
     ------
     ConfigError
-        If there is no such field, or the snapshot is in 3-D.
+        If there is no such field, the snapshot is in 3-D and there is no plane, or no fluid is in it.
     """
     field_style(name)
-    left, right, bottom, top = part = extent_of(snapshot, spacing, view)
+    left, right, bottom, top = part = extent_of(snapshot, spacing, view, plane)
     figure = blank(width, max(2.5, 0.81 * width * (top - bottom) / (right - left) + 0.75), "compressed")
     axes = figure.subplots()
-    _draw_field(axes, snapshot, name, spacing, part, limit)
-    axes.set_title(f"{title}, " * bool(title) + f"{TIME_LABEL} = {snapshot.time:.2f}")
+    _draw_field(axes, snapshot, name, spacing, part, limit, plane)
+    where = f"${AXES[plane.axis]}/D$ = {plane.place:g}, " if plane else ""
+    axes.set_title(f"{title}, " * bool(title) + where + f"{TIME_LABEL} = {snapshot.time:.2f}")
     return figure
 
 
@@ -139,12 +144,13 @@ def _draw_field(
     spacing: float,
     extent: tuple[float, float, float, float],
     limit: float | None,
+    plane: Plane | None = None,
 ) -> float:
     """Draw a field with its colour bar; return the end of the colour scale."""
     style = field_style(name)
     if limit is not None and not (isinstance(limit, int | float | np.number) and 0 < limit < np.inf):
         raise ConfigError(f"limit = {shown(limit)}: must be a number above zero")
-    picture, body = _raster(snapshot, _values(snapshot, name), spacing, extent)
+    picture, body = _raster(snapshot, name, spacing, extent, plane)
     limit = limit or _limit(picture)
     lowest = -limit if style.signed else 0.0
     frame: dict[str, Any] = {"extent": extent, "origin": "lower"}
@@ -153,13 +159,20 @@ def _draw_field(
         axes.contourf(body, levels=[0.5, np.inf], colors=["0.35"], **frame)
     label = style.label + (", less its mean" if name == "pressure" and _is_closed(snapshot) else "")
     axes.figure.colorbar(image, ax=axes, label=label, extend="both" if style.signed else "max", pad=0.02, fraction=0.05)
-    axes.set(xlabel="$x/D$", ylabel="$y/D$", aspect="equal")
+    horizontal, vertical = (AXES[axis] for axis in (plane.across if plane else (0, 1)))
+    axes.set(xlabel=f"${horizontal}/D$", ylabel=f"${vertical}/D$", aspect="equal")
     return limit
 
 
-def colour_limit(snapshot: Snapshot, name: str, spacing: float, extent: tuple[float, float, float, float]) -> float:
+def colour_limit(
+    snapshot: Snapshot,
+    name: str,
+    spacing: float,
+    extent: tuple[float, float, float, float],
+    plane: Plane | None = None,
+) -> float:
     """Return the end of the colour scale that a picture of a part of the plane has by itself."""
-    return _limit(_raster(snapshot, _values(snapshot, name), spacing, extent)[0])
+    return _limit(_raster(snapshot, name, spacing, extent, plane)[0])
 
 
 def _values(snapshot: Snapshot, name: str) -> FloatArray:
@@ -175,11 +188,11 @@ def _is_closed(snapshot: Snapshot) -> bool:
 
 
 def extent_of(
-    snapshot: Snapshot, spacing: float, view: Sequence[float] | None = None
+    snapshot: Snapshot, spacing: float, view: Sequence[float] | None = None, plane: Plane | None = None
 ) -> tuple[float, float, float, float]:
     """Return left, right, bottom and top of the view; without one, of the fluid without inlet and outlet buffers."""
-    if snapshot.position.shape[1] != 2:
-        raise ConfigError("pictures are drawn in 2-D only; open particles.vtkhdf in ParaView")
+    if plane is None and snapshot.position.shape[1] != 2:
+        raise ConfigError("pictures of several runs are drawn in 2-D only; open particles.vtkhdf in ParaView")
     if view is not None:
         try:
             left, right, bottom, top = map(float, view)
@@ -188,14 +201,14 @@ def extent_of(
         if not (0 < right - left < LARGEST_VIEW * spacing and 0 < top - bottom < LARGEST_VIEW * spacing):
             raise ConfigError(f"view = {shown(view)}: needs left, right, bottom and top, in this order [D]")
         return left, right, bottom, top
-    position = snapshot.position[snapshot.kind == Kind.FLUID]
+    position = snapshot.position[snapshot.kind == Kind.FLUID][:, plane.across if plane else [0, 1]]
     bounds = np.array([position.min(axis=0) - spacing / 2, position.max(axis=0) + spacing / 2])
     (left, bottom), (right, top) = np.round(bounds / spacing) * spacing
     return float(left), float(right), float(bottom), float(top)
 
 
 def _raster(
-    snapshot: Snapshot, values: FloatArray, spacing: float, extent: tuple[float, float, float, float]
+    snapshot: Snapshot, name: str, spacing: float, extent: tuple[float, float, float, float], plane: Plane | None
 ) -> tuple[FloatArray, FloatArray]:
     """Return the fluid's field (rows, columns), NaN where there is none, and the share of each pixel that is solid."""
     left, right, bottom, top = extent
@@ -203,11 +216,16 @@ def _raster(
     x = left + (np.arange(columns) + 0.5) * (right - left) / columns
     y = bottom + (np.arange(rows) + 0.5) * (top - bottom) / rows
     points = np.stack([grid.ravel() for grid in np.meshgrid(x, y)], axis=1)
-    fluid = snapshot.fluid
+    if plane is not None:
+        points, snapshot = plane.points(points), plane.near(snapshot, spacing)
+    fluid, values = snapshot.fluid, _values(snapshot, name)
     picture = sampling.average(snapshot.position[fluid], values[fluid], points, spacing).reshape(rows, columns)
     if fluid.all():
         return picture, np.zeros_like(picture)
-    body = sampling.fill(snapshot.position[~fluid], points, spacing).reshape(rows, columns)
+    body = sampling.fill(snapshot.position[~fluid], points, spacing)
+    if plane is not None:  # which may be one that the flow is computed on one side of
+        body = body / np.maximum(body + sampling.fill(snapshot.position[fluid], points, spacing), 0.1)
+    body = body.reshape(rows, columns)
     from scipy.ndimage import binary_fill_holes
 
     hollow = binary_fill_holes(body > 0.5) & np.isnan(picture)

@@ -22,24 +22,28 @@ IN_UNITS: dict[str, Quantity] = {
 REFERENCE = ", reference"
 
 
-def dimensional(results: Mapping[str, Any], units: Units, dimensions: int, chord: float) -> dict[str, Estimate]:
+def dimensional(
+    results: Mapping[str, Any], units: Units, dimensions: int, area: float, chord: float
+) -> dict[str, Estimate]:
     """Return those of the results of a run that have a dimension, in SI, under their names with the unit.
 
     Parameters
     ----------
     results
-        Results in D, U and ρ by name; coefficients are F/(½ρU²D) and M/(½ρU²c²).
+        Results in D, U and ρ by name; coefficients are F/(½ρU²A) and M/(½ρU²c²).
     units
         What D, U and ρ are.
     dimensions
         Number of space dimensions: in 2-D forces are per length.
+    area
+        A that force coefficients are formed with, a length in 2-D [D], an area in 3-D [D²].
     chord
         Length c that moment coefficients are formed with [D].
     """
     found = {}
     for name, value in results.items():
         base = name.removesuffix(REFERENCE)
-        known = _known(base, dimensions, chord)
+        known = _known(base, dimensions, area, chord)
         if known and isinstance(value, Estimate):
             title, quantity, share = known
             factor = share * units.factor(quantity)
@@ -48,13 +52,13 @@ def dimensional(results: Mapping[str, Any], units: Units, dimensions: int, chord
     return found
 
 
-def _known(name: str, dimensions: int, chord: float) -> tuple[str, Quantity, float] | None:
+def _known(name: str, dimensions: int, area: float, chord: float) -> tuple[str, Quantity, float] | None:
     """Return what a result is called in SI, its quantity, and the share of its unit that it is given in."""
     if name == "Strouhal number":
         return "shedding frequency", "frequency", 1.0
     if re.search(r"\b(drag|lift) coefficient\b", name):
         force: Quantity = "force_per_length" if dimensions == 2 else "force"
-        return name.replace(" coefficient", ""), force, 0.5
+        return name.replace(" coefficient", ""), force, 0.5 * area
     if "moment coefficient" in name and dimensions == 2:
         return name.replace(" coefficient", ""), "moment_per_length", 0.5 * chord**2
     for end, quantity in IN_UNITS.items():

@@ -198,7 +198,8 @@ class Fields:
         balances = [self._box_balance(self.snapshot(time), box) for time in times]
         surface, momentum = (np.array(values) for values in zip(*balances, strict=True))
         mean = averages.batch_means(times, surface, times[[0, -1]])[0]
-        return np.asarray(2.0 * (mean - (momentum[-1] - momentum[0]) / (times[-1] - times[0])))
+        force = mean - (momentum[-1] - momentum[0]) / (times[-1] - times[0])
+        return np.asarray(2.0 * force / self.config.case.reference_area)
 
     def _box_balance(self, snapshot: Snapshot, box: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
         fluid = snapshot.fluid

@@ -42,7 +42,7 @@ class Loads(Fields):
         return names, ("pressure", "viscous") if part == "total" else (part,)
 
     def coefficient(self, axis: str, part: str = "total", body: str | None = None) -> FloatArray:
-        """Force coefficient in every step, F / (½ρU²D).
+        """Force coefficient in every step, F / (½ρU²A), A the case's :attr:`~alsph.cases.Case.reference_area`.
 
         Parameters
         ----------
@@ -68,7 +68,8 @@ class Loads(Fields):
         names, parts = self._chosen(body, part)
         columns = [self.history.get(f"{name}_{each}_force_{axis}") for each in parts for name in names or [""]]
         missing = np.full(len(self.history["time"]), np.nan)
-        return 2.0 * sum((missing if column is None else column for column in columns), np.zeros_like(missing))
+        force = sum((missing if column is None else column for column in columns), np.zeros_like(missing))
+        return 2.0 * force / self.config.case.reference_area
 
     @cached_property
     def window(self) -> Window:

@@ -21,6 +21,7 @@ from alsph.folder import reading
 from alsph.folder.durable import check_folder
 from alsph.folder.run_folder import RunFolder
 from alsph.geometry.particles import Field
+from alsph.geometry.plane import Plane
 from alsph.parameters import choose
 from alsph.results.dimensional import dimensional
 from alsph.results.ledger import Ledger, mach_number
@@ -142,7 +143,7 @@ class Run(Loads):
             case = case.replace(units=units, reynolds=case.reynolds)
         if case.units is None:
             raise ConfigError(f"{self.path}: its case has no units; use run.dimensional(alsph.Units(...))")
-        return dimensional(self._results(), case.units, case.space_dimensions, case.chord)
+        return dimensional(self._results(), case.units, case.space_dimensions, case.reference_area, case.chord)
 
     def summary(self) -> dict[str, Any]:
         """Return the run's main results by name, its measures each followed by the reference value where there is one.
@@ -210,8 +211,9 @@ class Run(Loads):
         *,
         limit: float | None = None,
         view: tuple[float, float, float, float] | None = None,
+        plane: str | None = None,
     ) -> Figure:
-        """Picture of a field; saved if `path` is given.
+        """Picture of a field, in 3-D along a plane; saved if `path` is given.
 
         Parameters
         ----------
@@ -224,11 +226,22 @@ class Run(Loads):
             End of the colour scale; from the data if None.
         view : (left, right, bottom, top), optional
             Part of the plane to show [D]; all of it if None.
+        plane : str, optional
+            In 3-D the plane, such as ``"z=0.5"`` or ``"y"`` [D]; by default normal to z through the middle of the body,
+            or of the flow.
         """
         _plotting().field_style(name)
-        snapshot = self.snapshot(time)
-        figure = _plotting().field(snapshot, name, self.spacing, limit=limit, view=view, title=self._title)
+        options = {"limit": limit, "view": view, "title": self._title, "plane": self._plane(plane)}
+        figure = _plotting().field(self.snapshot(time), name, self.spacing, **options)
         return self._saved(figure, path, headed=True)
+
+    def _plane(self, given: str | None) -> Plane | None:
+        case = self.config.case
+        if case.space_dimensions == 2:
+            if given is not None:
+                raise ConfigError(f"plane = {shown(given)}: the run is in 2-D; leave it out")
+            return None
+        return Plane.of(given, case.middle)
 
     def animate(self, name: Field = "vorticity", path: str | Path | None = None, **options: Any) -> Path:
         """Make a film of a field from the snapshots.
@@ -241,7 +254,7 @@ class Run(Loads):
             among the run's figures if None.
         **options
             ``start`` and ``end``, times [D/U]; ``every``, of how many snapshots one is taken; ``fps``, pictures a
-            second; ``limit`` and ``view`` as of :meth:`plot_field`, the same for all pictures.
+            second; ``limit``, ``view`` and ``plane`` as of :meth:`plot_field`, the same for all pictures.
 
         Returns
         -------
@@ -251,8 +264,9 @@ class Run(Loads):
         Raises
         ------
         ConfigError
-            If there are fewer than two snapshots, the run is in 3-D, or an option cannot be used.
+            If there are fewer than two snapshots, or an option cannot be used.
         """
+        options["plane"] = self._plane(options.get("plane"))
         if path is None:
             check_folder(self.path / "figures")
         target: Path = _plotting().Film(path if path is not None else self.path / "figures" / f"{name}.gif")

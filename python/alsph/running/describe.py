@@ -4,7 +4,7 @@ import time as clock
 
 import numpy as np
 
-from alsph.cases import Body
+from alsph.cases import Body, Body3D
 from alsph.config import Config
 from alsph.engine.simulation import Simulation
 from alsph.errors import SolverError
@@ -42,7 +42,7 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
     steps = config.until / (step * case.particle_spacing)
     lines = [
         ("case", f"{case.name}: {case.title}"),
-        *((("outline", str(case.shape)),) if isinstance(case, Body) else ()),
+        *((("outline", str(case.shape)),) if isinstance(case, Body | Body3D) else ()),
         ("Reynolds number", f"{case.reynolds:g}"),
         ("resolution", f"D/Δx = {case.resolution}, Δx = {case.particle_spacing:.6g} D"),
         ("particles", f"{kinds.sum():,}: {counts}"),

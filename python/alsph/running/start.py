@@ -13,6 +13,7 @@ from alsph.engine.prescribed import difference
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.folder.checkpoint import Checkpoint
 from alsph.folder.run_folder import RunFolder
+from alsph.geometry.mesh import Mesh
 from alsph.geometry.outline import Outline
 from alsph.results.run import Run
 from alsph.running import beginning
@@ -39,7 +40,7 @@ def start(config: Config, path: Path, control: Control | None = None, *, force: 
         folder.truncate(0, 0.0, driver.outputs)
         for remark in remarks:
             folder.log(f"warning: {remark}")
-        if isinstance(outline := getattr(config.case, "shape", None), Outline):
+        if isinstance(outline := getattr(config.case, "shape", None), Outline | Mesh):
             folder.log(f"outline: {outline}")
         if config.run.initial_run is not None:
             folder.write_start(simulation.state(), config.case_tables())

@@ -1,0 +1,26 @@
+"""Flow past a sphere."""
+
+from typing import ClassVar
+
+from pydantic import Field
+
+from alsph.cases.spatial import Spatial
+from alsph.geometry.volume import Volume, sphere
+
+
+class Sphere(Spatial):
+    """Flow past a sphere of diameter D in a channel with free-slip walls and uniform inflow U.
+
+    Up to about Re = 210 it is steady and axisymmetric (Johnson and Patel, J. Fluid Mech. 378 (1999) 19), so that a
+    quarter of it will do. In unbounded flow C_D is 1.09 at Re = 100; the channel's walls raise it.
+    """
+
+    name: ClassVar[str] = "sphere"
+    title: ClassVar[str] = "flow past a sphere in a channel"
+    body_name: ClassVar[str] = "sphere"
+
+    reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
+
+    def volume(self) -> Volume:
+        """Return a sphere of diameter 1."""
+        return sphere(0.5)

@@ -1,0 +1,179 @@
+"""Closed triangle meshes: read from files, kept as text, and the distances from them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from functools import cached_property
+from io import StringIO
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from alsph.arrays import FloatArray
+from alsph.errors import ConfigError
+from alsph.geometry.volume import Volume
+from alsph.parameters import Parameters
+from alsph.text import shown
+
+FORMATS = (".stl", ".ply", ".obj", ".off")
+LARGEST_FILE = 2**28
+"""Size of the largest file that is read [bytes]."""
+MOST_TRIANGLES = 50_000
+"""A run folder holds them as text, some 40 bytes a triangle."""
+UNREADABLE = "holds no triangles that can be read; is it whole, and of the format that its name says?"
+
+
+class Mesh(Parameters):
+    """The triangles of a closed surface. A run folder holds them, and so needs no file beside it."""
+
+    FORMS: ClassVar[str] = "must be a trimesh.Trimesh, or vertices (n, 3) and triangles (m, 3) of their indices"
+
+    file: str = Field(description="name of the file that they were read from")
+    sha256: str = Field(description="SHA-256 of the triangles as they are written here")
+    triangles: str = Field(
+        description="a line `v x y z` a vertex, and `f i j k` a triangle, as in an OBJ file", repr=False
+    )
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Self:
+        """Read a file: STL, PLY, OBJ or OFF.
+
+        Raises
+        ------
+        ConfigError
+            If it holds no closed surface; the message names the file.
+        """
+        trimesh = _library()
+        name = shown(os.path.basename(path)).strip("'")
+        if not os.path.isfile(path):
+            raise ConfigError(f"{shown(path)}: no such file")
+        if os.path.getsize(path) > LARGEST_FILE:
+            raise ConfigError(f"{name}: larger than {LARGEST_FILE >> 20} MiB; reduce the number of triangles")
+        kind = os.path.splitext(path)[1].lower()
+        if kind not in FORMATS:
+            raise ConfigError(f"{name}: a mesh is a file of triangles, {', '.join(FORMATS)}")
+        try:
+            with open(path, "rb") as file:
+                found = trimesh.load_mesh(file, file_type=kind[1:], process=True)
+        except Exception:  # whatever the reader of the format raises
+            raise ConfigError(f"{name}: {UNREADABLE}") from None
+        return cls._of(found, name)
+
+    @classmethod
+    def of(cls, shape: Any) -> Self:
+        """Return the mesh of a ``trimesh.Trimesh``, or of vertices (n, 3) and triangles (m, 3)."""
+        trimesh = _library()
+        if not isinstance(shape, trimesh.Trimesh):
+            try:
+                vertices, triangles = shape
+                shape = trimesh.Trimesh(np.asarray(vertices, float), np.asarray(triangles, int))
+            except Exception:
+                raise ConfigError(f"mesh: {cls.FORMS}") from None
+        return cls._of(shape, "<mesh>")
+
+    @classmethod
+    def _of(cls, mesh: Any, name: str) -> Self:
+        if not hasattr(mesh, "faces") or not len(mesh.faces):
+            raise ConfigError(f"{name}: {UNREADABLE}")
+        if not np.isfinite(mesh.vertices).all():
+            raise ConfigError(f"{name}: has a vertex that is no finite number")
+        if len(mesh.faces) > MOST_TRIANGLES:
+            raise ConfigError(
+                f"{name}: {len(mesh.faces)} triangles, more than {MOST_TRIANGLES}; reduce them, by Decimate in Blender "
+                "or MeshLab"
+            )
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)
+        mesh.update_faces(mesh.nondegenerate_faces())
+        mesh.remove_unreferenced_vertices()
+        if not mesh.is_watertight:
+            edges = np.sort(mesh.edges, axis=1)
+            counts = np.unique(edges, axis=0, return_counts=True)[1]
+            raise ConfigError(
+                f"{name}: is not closed, {np.count_nonzero(counts != 2)} edges are not those of two triangles; "
+                "close it in the program that it comes from"
+            )
+        mesh.fix_normals()
+        lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in mesh.vertices]
+        lines += [f"f {i} {j} {k}" for i, j, k in mesh.faces + 1]
+        text = "\n".join([*lines, ""])
+        return cls(file=name, sha256=_sha256(text), triangles=text)
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        if _sha256(self.triangles) != self.sha256:
+            raise ValueError(f"{self.file}: the triangles are not those of the SHA-256 beside them")
+        return self
+
+    @cached_property
+    def surface(self) -> Any:
+        """The triangles as a ``trimesh.Trimesh``, in the unit of the file."""
+        return _library().load_mesh(StringIO(self.triangles), file_type="obj", process=False)
+
+    def __str__(self) -> str:
+        """Return the name of the file and the number of triangles."""
+        return f"{self.file}: {len(self.surface.faces)} triangles"
+
+    def volume(self, scale: float, angle: float = 0.0) -> Volume:
+        """Return the body, its larger extent `scale` [D], turned nose up about its centre of volume, which lies at 0.
+
+        Parameters
+        ----------
+        scale
+            Largest extent along x, y or z before it is turned [D].
+        angle
+            Angle of attack [degrees].
+        """
+        mesh = self.surface
+        extent = float(np.ptp(mesh.vertices, axis=0).max())
+        vertices = (np.asarray(mesh.vertices) - mesh.center_mass) * (scale / extent)
+        c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        vertices = vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]).T
+        triangles = np.asarray(mesh.faces, np.int64)
+
+        def nearest(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+            return _nearest(vertices, triangles, points)
+
+        return Volume(
+            distance=lambda points: nearest(points)[0],
+            lower=vertices.min(axis=0),
+            upper=vertices.max(axis=0),
+            volume=float(mesh.volume) * (scale / extent) ** 3,
+            frontal_area=_shadow(vertices, triangles),
+            nearest=lambda points: nearest(points)[1],
+        )
+
+
+def _library() -> Any:
+    try:
+        import igl
+        import trimesh
+    except ImportError:
+        raise ConfigError("a mesh needs the packages trimesh and libigl; pip install 'alsph[meshes]'") from None
+    del igl
+    return trimesh
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _nearest(vertices: FloatArray, triangles: NDArray[np.int64], points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the signed distances (n,) of points (n, 3) from a mesh, and its nearest points (n, 3)."""
+    import igl
+
+    kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
+    distance, _, feet, _ = igl.signed_distance(np.ascontiguousarray(points), vertices, triangles, kind)
+    return np.asarray(distance), np.asarray(feet)
+
+
+def _shadow(vertices: FloatArray, triangles: NDArray[np.int64]) -> float:
+    """Return the area of the shadow along x."""
+    import shapely
+
+    corners = vertices[triangles][:, :, 1:]
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    seen = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] > 0
+    return float(shapely.union_all(shapely.polygons(corners[seen])).area)

@@ -1,0 +1,156 @@
+"""Bodies, in space above all, whose surface is known by the distance from it, and the particles under it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from alsph.arrays import FloatArray
+from alsph.geometry.lattice import lattice, symmetric_centres
+from alsph.geometry.packing import spread
+from alsph.geometry.particles import neighbour_tree
+from alsph.geometry.solids import Solid
+
+PROBES = 2000
+"""Number of points at which a body is compared with its mirror images."""
+
+SETTLED = 0.01
+"""How far from its layer a solid particle may be [Δx]; one that cannot come so near, in an edge, is left out."""
+
+NEAR = 1e-9
+"""Distance over the size of a body at which a point lies on its surface."""
+
+STEEP = 0.9
+"""Least slope of the distance, 1 everywhere but where several points of the surface are as near."""
+
+
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """A body in d dimensions, given by the signed distance of points from its surface.
+
+    Attributes
+    ----------
+    distance : callable
+        Takes points (n, d) [D] and gives how far they lie outside of the body (n,) [D], negative inside.
+    lower, upper : ndarray, shape (d,)
+        Corners of a box around the body [D].
+    volume, frontal_area : float
+        Its volume [D^d] and the area of its shadow along x [D^(d-1)].
+    nearest : callable, optional
+        Takes points (n, d) and gives those of the surface that are nearest (n, d); by default found from the slope of
+        the distance.
+    """
+
+    distance: Callable[[FloatArray], FloatArray]
+    lower: FloatArray
+    upper: FloatArray
+    volume: float
+    frontal_area: float
+    nearest: Callable[[FloatArray], FloatArray] | None = None
+
+    @property
+    def corners(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper corner (d,) of the box [D]."""
+        return self.lower, self.upper
+
+    @property
+    def size(self) -> float:
+        """Largest extent of the box [D]."""
+        return float((self.upper - self.lower).max())
+
+    @cached_property
+    def flips(self) -> Sequence[FloatArray]:
+        """Factors (d,) of y and of z that make mirror images in planes through 0 that are the body itself."""
+        points = np.random.default_rng(0).uniform(self.lower, self.upper, (PROBES, len(self.lower)))
+        flips = 1.0 - 2.0 * np.eye(len(self.lower))[1:]
+        here = self.height(points)
+        return [flip for flip in flips if np.abs(self.height(points * flip) - here).max() < 1e-9 * self.size]
+
+    def height(self, points: FloatArray) -> FloatArray:
+        """Return how far points (n, d) lie outside of the body (n,), negative inside [D]."""
+        return np.asarray(self.distance(points))
+
+    def slope(self, points: FloatArray) -> FloatArray:
+        """Return the gradient (n, d) of the height at points (n, d), the normal of the nearest piece of surface."""
+        if self.nearest is not None:
+            height, offset = self.height(points), points - self.nearest(points)
+            return offset / np.where(np.abs(height) < NEAR * self.size, np.inf, height)[:, None]
+        step = 1e-4 * self.size
+        sides = [
+            self.height(points + step * axis) - self.height(points - step * axis) for axis in np.eye(len(self.lower))
+        ]
+        return np.stack(sides, axis=1) / (2 * step)
+
+    def feet(self, points: FloatArray) -> FloatArray:
+        """Return the points (n, d) of the surface that are nearest to points (n, d)."""
+        return self.nearest(points) if self.nearest else self._at(points, np.zeros(len(points)))
+
+    def solid(self, spacing: float, layers: int) -> Solid:
+        """Place solid particles on layers that follow the surface, at depths of 1/2, 3/2, ... spacings, evenly spaced.
+
+        Each layer gets as many as a lattice has points in the shell of its thickness.
+        """
+        height = self.height(cells := self._cells(spacing))
+        under = (height < 0) & (height > -layers * spacing)
+        start = cells[under]
+        depth = (np.floor(-height[under] / spacing) + 0.5) * spacing
+        position = spread(
+            start, np.empty((0, start.shape[1])), spacing, lambda points: self._at(points, -depth), self.flips
+        )
+        found, slope = self.height(position), self.slope(position)
+        steepness = np.linalg.norm(slope, axis=1)
+        kept = (np.abs(found + depth) < SETTLED * spacing) & (steepness > STEEP)
+        return Solid(position, slope / np.maximum(steepness, STEEP)[:, None], depth).where(kept)
+
+    def left(self, thickness: float) -> float:
+        """Return the share of the volume that balls of that diameter [D] reach without leaving the body."""
+        points = self._cells(thickness / 4)
+        height = self.height(points)
+        core, inside = points[height <= -thickness / 2], points[height < 0]
+        if not len(core):
+            return 0.0
+        reached = neighbour_tree(core).query(inside)[0] <= thickness / 2 * (1 + SETTLED)
+        return float(np.count_nonzero(reached | (-height[height < 0] < thickness / 8)) / len(inside))
+
+    @property
+    def thickness(self) -> float:
+        """Diameter of about the largest ball in the body [D]."""
+        return float(-2 * self.height(self._cells(self.size / 60)).min())
+
+    def _cells(self, spacing: float) -> FloatArray:
+        """Centres (n, d) of a lattice about 0 around the body."""
+        counts = np.ceil(np.maximum(-self.lower, self.upper) / spacing).astype(int)
+        return lattice(*(symmetric_centres(2 * count, spacing) for count in counts))
+
+    def _at(self, points: FloatArray, height: FloatArray) -> FloatArray:
+        """Return the points (n, d) moved along the normal to heights (n,) over the surface."""
+        for _ in range(2):
+            points = points + (height - self.height(points))[:, None] * self.slope(points)
+        return points
+
+
+def cube(side: float, angle: float) -> Volume:
+    """Return a cube about 0 (lengths in D), turned nose up by an angle of attack [degrees]."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    back = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    across = abs(c) + abs(s)
+    corner = 0.5 * side * np.array([across, across, 1.0])
+
+    def distance(points: FloatArray) -> FloatArray:
+        beyond = np.abs(points @ back) - 0.5 * side
+        return np.asarray(np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0))
+
+    return Volume(distance, -corner, corner, side**3, side**2 * across)
+
+
+def sphere(radius: float) -> Volume:
+    """Return a sphere about 0 (lengths in D)."""
+    corner = np.full(3, radius)
+
+    def distance(points: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.norm(points, axis=1) - radius)
+
+    return Volume(distance, -corner, corner, 4 / 3 * np.pi * radius**3, np.pi * radius**2)
