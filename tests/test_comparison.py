@@ -14,7 +14,7 @@ from alsph.errors import ConfigError, RunFolderError
 from alsph.folder.run_folder import RunFolder
 from alsph.plotting import profile
 from alsph.study.comparison import _difference, _told, compare
-from synthetic import SHORT, write_flow, write_run
+from synthetic import SHORT, history, write_flow, write_run
 
 DRAG = "mean drag coefficient"
 
@@ -145,3 +145,14 @@ def test_the_command_line_compares(alsph, folders, tmp_path, monkeypatch):
     assert code == 2 and "given twice" in err and len(err.splitlines()) == 1
     code, out, _ = alsph("compare", *folders, "--output", tmp_path / "out")
     assert str(tmp_path / "out" / "comparison.md") in out
+
+
+def test_bodies_of_as_many_points_are_told_apart(tmp_path):
+    paths = []
+    for width in (1.0, 1.2):
+        square = 0.5 * np.array([[-width, -1], [width, -1], [width, 1], [-width, 1]])
+        case = package.cases.Body(shape=square, resolution=8, length=6, height=6, upstream=3)
+        paths.append(write_flow(tmp_path / str(width), case, lambda position, time: 0 * position).path)
+        RunFolder(paths[-1]).append_history(history(end=0.1), case.coefficient_bodies)
+    (row,) = compare(paths).parameters.values()
+    assert all("a body of 4 points, SHA-256 " in cell for cell in row) and row[0] != row[1]
