@@ -15,6 +15,7 @@ from alsph.cases import (
     Couette,
     Cylinder,
     CylinderPair,
+    Nozzle,
     Poiseuille,
     PressureJump,
     PulsatingChannel,
@@ -45,7 +46,9 @@ def test_walls_continue_the_lattice_of_the_fluid(model):
     assert near.max() == 45 if periodic else (near == 45).all()
 
 
-@pytest.mark.parametrize("model", [Cavity, Poiseuille, Couette, PulsatingChannel, BackwardFacingStep, PressureJump])
+@pytest.mark.parametrize(
+    "model", [Cavity, Poiseuille, Couette, PulsatingChannel, BackwardFacingStep, Nozzle, PressureJump]
+)
 def test_a_few_steps_stay_sound(model):
     simulation = model(resolution=10).simulation(threads=1)
     volume = simulation.counts["fluid"] / 100
@@ -217,6 +220,57 @@ def test_step_measure_finds_the_reattachment(tmp_path):
     for other in case.replace(reynolds=200), case.replace(upstream=4.0):
         (unknown,) = other.measures(run)
         assert (unknown.value, math.isnan(unknown.reference)) == (measure.value, True)
+
+
+@pytest.mark.parametrize("contraction", [1.5, 3.0])
+def test_nozzle_starts_with_the_same_flow_rate_everywhere(tmp_path, contraction):
+    case = Nozzle(contraction=contraction)
+    state, spacing = case.particles(), case.particle_spacing
+    position, velocity, kind = (state[name] for name in ("position", "velocity", "kind"))
+    for side, height in ((Kind.INLET, contraction), (Kind.OUTLET, 1.0)):
+        column = (kind == side) & (position[:, 0] == position[kind == side, 0][0])
+        assert column.sum() == height * case.resolution
+        assert velocity[column, 0].sum() * spacing == pytest.approx(1.0, rel=2e-3)
+    fluid = position[kind == Kind.FLUID]
+    assert sorted(map(tuple, np.round(fluid, 9))) == sorted(map(tuple, np.round(fluid * (1, -1), 9)))
+    assert case.fluid_volume() == pytest.approx(case.channel().area, rel=2e-3)
+    depth, beyond = state["depth"], np.abs(position[:, 1]) - case.height(position[:, 0]) / 2
+    slope = np.pi * (contraction - 1) / (4 * case.transition)
+    solid = (kind == Kind.SOLID) & (beyond < spacing) & (np.abs(position[:, 0] - 1) < 3)
+    assert (beyond[solid] > 0).all() and (depth[solid] <= beyond[solid] + 1e-4).all()
+    assert (depth[solid] >= beyond[solid] / np.hypot(1, slope) - 0.1 * spacing).all()
+    near = KDTree(position).query_ball_point(fluid, 3.9 * spacing, return_length=True)
+    assert (near == 45).all()  # no place of the lattice is empty
+
+
+def test_nozzle_measures(tmp_path):
+    case = Nozzle(resolution=10)
+    run = write_flow(tmp_path / "run", case, lambda r, t: case.developed(r))
+    rate, profile = case.measures(run)
+    assert rate.value < 5e-3 and profile.value < 1e-4 and rate.passed and profile.passed
+    leaking = write_flow(tmp_path / "leak", case, lambda r, t: case.developed(r) * (1 - 0.1 * (r[:, :1] > 3)))
+    rate, profile = case.measures(leaking)
+    assert (rate.value, profile.value) == (pytest.approx(0.1, abs=5e-3), pytest.approx(0.1, abs=1e-3))
+    assert not rate.passed and not profile.passed
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"contraction": 1.33}, "contraction: the step on each side, .* not a whole number of particle spacings"),
+        ({"transition": 0.33}, "transition = 0.33: not a whole number"),
+        ({"contraction": 1.0}, "contraction = 1.0: must be greater than 1"),
+    ],
+)
+def test_nozzles_that_do_not_fit_the_lattice_are_refused(changes, told):
+    with pytest.raises(ConfigError, match=told):
+        Nozzle(**changes)
+
+
+def test_a_short_nozzle_keeps_mass_and_comes_to_the_parabola(tmp_path):
+    case = Nozzle(resolution=8, contraction=1.5, reynolds=20.0, transition=1.0, upstream=1.0, downstream=2.5)
+    run = case.run(tmp_path / "run", until=5.0, threads=1, progress=False)
+    assert all(measure.passed for measure in run.measures), run.measures
 
 
 def test_last_upward_zero():

@@ -25,6 +25,7 @@ from alsph.cases.channel import Channel
 from alsph.cases.couette import Couette
 from alsph.cases.cylinder import Cylinder
 from alsph.cases.cylinder_pair import CylinderPair
+from alsph.cases.nozzle import Nozzle
 from alsph.cases.pipe import Pipe
 from alsph.cases.poiseuille import Poiseuille
 from alsph.cases.pressure_jump import PressureJump
@@ -39,7 +40,7 @@ from alsph.parameters import suggest
 CASES: dict[str, type[Case]] = {
     case.name: case
     for case in (
-        *(Cylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Cavity),
+        *(Cylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Nozzle, Cavity),
         *(Poiseuille, Couette, PulsatingChannel, Pipe, PressureJump, TaylorGreen),
     )
 }
@@ -57,6 +58,7 @@ __all__ = [
     "Cylinder",
     "CylinderPair",
     "Domain",
+    "Nozzle",
     "Pipe",
     "Poiseuille",
     "PressureJump",

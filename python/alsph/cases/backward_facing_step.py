@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from alsph import reference
@@ -15,14 +14,11 @@ from alsph.analysis import sampling
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
-from alsph.cases.base import Case
-from alsph.geometry.domain import Domain, SolidBody
-from alsph.geometry.lattice import cell_centres, cells, inside, lattice
-from alsph.geometry.particles import Kind, join, particles
-from alsph.geometry.solids import walls
+from alsph.cases.duct import Duct, parabola
+from alsph.geometry.lattice import cell_centres, lattice
 
 
-class BackwardFacingStep(Case):
+class BackwardFacingStep(Duct):
     """Flow over a backward-facing step of height D in a channel with no-slip walls; U is the mean inflow velocity.
 
     The step's edge lies at x = 0, y = D; the channel behind it reaches from y = 0 to y = ED/(E - 1) with the expansion
@@ -38,8 +34,6 @@ class BackwardFacingStep(Case):
     reynolds: float = Field(default=100.0, gt=0, description="Reynolds number 2hU/ν, h the inlet channel's height [-]")
     resolution: int = Field(default=20, ge=8, description="particles per step height, D/Δx [-]")
     expansion: float = Field(default=2.0, gt=1, description="height of the outlet channel over the inlet channel's [-]")
-    upstream: float = Field(default=5.0, gt=0, description="length of the inlet channel [D]")
-    downstream: float = Field(default=20.0, gt=0, description="length of the channel behind the step [D]")
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -68,54 +62,17 @@ class BackwardFacingStep(Case):
         """Length 2h that the Reynolds number is formed with [D]."""
         return 2.0 * self.inlet_height
 
-    def domain(self) -> Domain:
-        """Return the bounds of the channel: inlet and outlet; solid particles close the rest."""
-        top = 1.0 + self.inlet_height
-        return Domain((-self.upstream, 0), (self.downstream, top), [("inlet", "outlet"), ("none", "none")])
-
-    def bodies(self) -> list[SolidBody]:
-        """Return the walls, at rest."""
-        return [SolidBody("walls", (0, 0))]
-
-    def particle_estimate(self) -> int:
-        """Return about how many particles there are, solid and buffers included."""
-        buffers = 2 * (self.buffer_columns + self.support_layers)
-        length = (self.upstream + self.downstream) * self.resolution + buffers
-        area = self.inlet_height * length + self.downstream * self.resolution + buffers / 2
-        return round(area * self.resolution + 2 * self.support_layers * (length + self.resolution / 2))
-
-    def particles(self) -> dict[str, NDArray[Any]]:
-        """Return a lattice in the channel and its buffers, each with its developed flow, between solid walls."""
-        spacing, buffer = self.particle_spacing, self.buffer_columns * self.particle_spacing
-        end = buffer + self.support_layers * spacing
-        channel = self._channel(end)
-        solid = walls(channel, spacing, self.support_layers)
-        x = solid.position[:, 0]
-        points = cells(channel, spacing)
-        points = points[inside(channel, points)]
-        before, behind = -self.upstream - points[:, 0], points[:, 0] - self.downstream
-        groups = {
-            Kind.FLUID: (before < 0) & (behind < 0),
-            Kind.INLET: (before > 0) & (before < buffer),
-            Kind.OUTLET: (behind > 0) & (behind < buffer),
-        }
-        return join(
-            *(particles(kind, points[chosen], self._developed(points[chosen])) for kind, chosen in groups.items()),
-            solid.where((x > -self.upstream - end) & (x < self.downstream + end)).particles(),
-        )
-
-    def _channel(self, end: float) -> shapely.Polygon:
+    def channel(self, end: float = 0.0) -> shapely.Polygon:
         """Return the channel, longer by `end` [D] on both sides."""
         left, right, top = -self.upstream - end, self.downstream + end, 1.0 + self.inlet_height
         return shapely.box(left, 0, right, top) - shapely.box(left, 0, 0, 1)
 
-    def _developed(self, position: FloatArray) -> FloatArray:
+    def developed(self, position: FloatArray) -> FloatArray:
         """Return the parabolas (n, 2) of the same flow rate in the inlet channel and behind the step."""
         x, y = position.T
         floor = np.where(x < 0, 1.0, 0.0)
         height = 1.0 + self.inlet_height - floor
-        share = (y - floor) / height
-        return np.stack([6 * self.inlet_height / height * share * (1 - share), 0 * y], axis=1)
+        return parabola((y - floor) / height, self.inlet_height / height)
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the distance from the step at which the flow reattaches, averaged over the last quarter of the run."""
