@@ -11,7 +11,13 @@ import alsph
 
 HERE = Path(__file__).parent
 RUNS = HERE.parent / "target" / "gallery"
-FIELDS = {"cavity": "velocity", "body": "velocity", "backward_facing_step": "velocity", "pressure_jump": "pressure"}
+FIELDS = {
+    "cavity": "velocity",
+    "body": "velocity",
+    "body_3d": "velocity",
+    "backward_facing_step": "velocity",
+    "pressure_jump": "pressure",
+}
 """The field of each picture that is neither of the vorticity nor a profile."""
 
 
