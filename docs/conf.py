@@ -41,7 +41,7 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
-html_sidebars = {"gallery": [], "command_line": []}
+html_sidebars = {page: [] for page in ("gallery", "command_line", "equations")}  # they have no pages below them
 copyright = "The alsph developers, MIT licence"
 
 # Markdown. Anchors are GitHub's, so that links work on both.
