@@ -50,7 +50,7 @@ TOO_THIN = "too thin"
 LEAST_LEFT = 0.5
 """Share of its area below which what the resolution carries of a body is no longer that body."""
 
-MOST_LEFT = 0.98
+MOST_LEFT = 0.95
 """Share of its volume below which a body in space has thin parts to speak of; a cube's edges take less."""
 
 THICK = 8.0

@@ -20,6 +20,9 @@ PROBES = 2000
 SETTLED = 0.01
 """How far from its layer a solid particle may be [Δx]; one that cannot come so near, in an edge, is left out."""
 
+OUTSIDE = 3
+"""Number of layers outside a body."""
+
 NEAR = 1e-9
 """Distance over the size of a body at which a point lies on its surface."""
 
@@ -91,15 +94,14 @@ class Volume:
     def solid(self, spacing: float, layers: int) -> Solid:
         """Place solid particles on layers that follow the surface, at depths of 1/2, 3/2, ... spacings, evenly spaced.
 
-        Each layer gets as many as a lattice has points in the shell of its thickness.
+        Each layer gets as many as a lattice has points in the shell of its thickness. Layers outside hold them in place
+        while they are spread.
         """
-        height = self.height(cells := self._cells(spacing))
-        under = (height < 0) & (height > -layers * spacing)
-        start = cells[under]
-        depth = (np.floor(-height[under] / spacing) + 0.5) * spacing
-        position = spread(
-            start, np.empty((0, start.shape[1])), spacing, lambda points: self._at(points, -depth), self.flips
-        )
+        height = self.height(cells := self._cells(spacing, OUTSIDE))
+        near = np.abs(height) < np.where(height < 0, layers, OUTSIDE) * spacing
+        start, held = cells[near], (np.floor(height[near] / spacing) + 0.5) * spacing
+        position = spread(start, start[:0], spacing, lambda points: self._at(points, held), self.flips)[held < 0]
+        depth = -held[held < 0]
         found, slope = self.height(position), self.slope(position)
         steepness = np.linalg.norm(slope, axis=1)
         kept = (np.abs(found + depth) < SETTLED * spacing) & (steepness > STEEP)
@@ -107,23 +109,27 @@ class Volume:
 
     def left(self, thickness: float) -> float:
         """Return the share of the volume that balls of that diameter [D] reach without leaving the body."""
-        points = self._cells(thickness / 4)
+        cell, radius = thickness / 6, thickness / 2
+        points = self._cells(cell)
         height = self.height(points)
-        core, inside = points[height <= -thickness / 2], points[height < 0]
+        core, inside = points[height < cell / 2 - radius], points[height < 0]  # half a cell is what the lattice misses
         if not len(core):
             return 0.0
-        reached = neighbour_tree(core).query(inside)[0] <= thickness / 2 * (1 + SETTLED)
-        return float(np.count_nonzero(reached | (-height[height < 0] < thickness / 8)) / len(inside))
+        return float(np.mean(neighbour_tree(core).query(inside)[0] < radius + cell / 2))
 
     @property
     def thickness(self) -> float:
         """Diameter of about the largest ball in the body [D]."""
         return float(-2 * self.height(self._cells(self.size / 60)).min())
 
-    def _cells(self, spacing: float) -> FloatArray:
-        """Centres (n, d) of a lattice about 0 around the body."""
-        counts = np.ceil(np.maximum(-self.lower, self.upper) / spacing).astype(int)
-        return lattice(*(symmetric_centres(2 * count, spacing) for count in counts))
+    def _cells(self, spacing: float, margin: int = 0) -> FloatArray:
+        """Centres (n, d) of the cells that fit into the box, with so many more on each side.
+
+        Faces of the body that lie in those of the box are then midway between them.
+        """
+        counts = np.maximum(1, np.rint((self.upper - self.lower) / spacing).astype(int)) + 2 * margin
+        middle = (self.lower + self.upper) / 2
+        return middle + lattice(*(symmetric_centres(count, spacing) for count in counts))
 
     def _at(self, points: FloatArray, height: FloatArray) -> FloatArray:
         """Return the points (n, d) moved along the normal to heights (n,) over the surface."""
