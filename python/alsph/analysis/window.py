@@ -1,6 +1,7 @@
 """The averaging window: where the transient ends, whether vortices are shed, and whether the flow still develops."""
 
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,8 +97,10 @@ def averaging_window(time: FloatArray, drag: FloatArray, lift: FloatArray, thick
         return _whole_periods(time, drag, lift, edges[(len(edges) - 1) // 2 :], rule, settled=False)
     rule = "periodic: whole shedding periods after the transient"
     rest = (len(edges) - 1 - first) // 8  # what is left of the transient is a trend, too, which a later start cures
-    windows = [_whole_periods(time, drag, lift, edges[k:], rule, settled=True) for k in range(first, first + rest + 1)]
-    return next((window for window in windows if not window.developing), windows[0])
+    starts = range(first, first + rest + 1)
+    windows = (_whole_periods(time, drag, lift, edges[k:], rule, settled=True) for k in starts)
+    earliest = next(windows)
+    return next((window for window in chain([earliest], windows) if not window.developing), earliest)
 
 
 def _whole_periods(

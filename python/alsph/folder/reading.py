@@ -116,7 +116,7 @@ class History:
 
     def _forget(self) -> None:
         self._names: list[str] = []
-        self._table = np.empty((0, 0))
+        self._columns, self._count = np.empty((0, 0)), 0  # with room for more rows than there are
         self._end, self._last = 0, b""  # how far it has been read, and the line there
 
     def read(self) -> dict[str, FloatArray]:
@@ -135,7 +135,7 @@ class History:
         except RunFolderError:
             self._forget()
             raise
-        return dict(zip(self._names, self._table.T, strict=True)) or {"time": np.empty(0)}
+        return dict(zip(self._names, self._columns[:, : self._count], strict=True)) or {"time": np.empty(0)}
 
     def _added(self) -> bytes:
         """Return the whole lines that have not been read yet: all of them if it is another file than before."""
@@ -145,7 +145,10 @@ class History:
             if not text.startswith(self._last):  # cut back or replaced
                 self._forget()
                 text = contents(self.path, most)
-        return text[len(self._last) : text.rfind(b"\n") + 1]
+        end = text.rfind(b"\n") + 1
+        if text and not (self._names or end):
+            raise RunFolderError(f"{self.path}: its first line is cut short; is this a run folder of alsph?")
+        return text[len(self._last) : end]
 
     def _append(self, added: bytes) -> None:
         with _refusing(self.path, UnicodeDecodeError):
@@ -154,11 +157,15 @@ class History:
             self._names = lines.pop(0).split(",")
             if "time" not in self._names:
                 raise RunFolderError(f"{self.path}: no column 'time' in the first line; is this a run folder of alsph?")
-            self._table = np.empty((0, len(self._names)))
+            self._columns = np.empty((len(self._names), 0))
         rows = [line for line in lines if line.count(",") == len(self._names) - 1]
+        count = self._count + len(rows)
+        if count > self._columns.shape[1]:
+            self._columns = np.pad(self._columns[:, : self._count], ((0, 0), (0, len(rows) + count // 4)))
         with _refusing(self.path, ValueError):
             if rows:
-                self._table = np.concatenate([self._table, np.loadtxt(rows, delimiter=",", ndmin=2)])
+                self._columns[:, self._count : count] = np.loadtxt(rows, delimiter=",", ndmin=2).T
+        self._count = count
         self._end += len(added)
         self._last = added[added.rfind(b"\n", 0, -1) + 1 :]
 
