@@ -15,6 +15,7 @@ FIELDS = {
     "cavity": "velocity",
     "body": "velocity",
     "body_3d": "velocity",
+    "nozzle": "velocity",
     "backward_facing_step": "velocity",
     "pressure_jump": "pressure",
 }
