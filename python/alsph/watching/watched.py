@@ -108,9 +108,13 @@ class Watched:
         of, run = self._now(), Run(self.path)
 
         def judge() -> bytes:
+            problems: list[str] = []
             with self._reading:
-                run.history = self._history.read()
-            return _json(_judged(run))
+                history = _tried(problems, self._history.read, None)
+            if history is None:
+                return _json({"problems": problems})
+            run.history = history
+            return _json(_judged(run, problems))
 
         return self._results.get((of, run.status), judge)
 
@@ -248,9 +252,8 @@ def _fields(run: Run) -> list[str]:
     return [] if run.case.get("dimensions") == 3 else list(plotting.FIELDS)
 
 
-def _judged(run: Run) -> dict[str, Any]:
+def _judged(run: Run, problems: list[str]) -> dict[str, Any]:
     """Return what ``alsph info`` tells, the window, the means that are drawn, and the remarks."""
-    problems: list[str] = []
     known = ("case", "Reynolds number", "resolution, D/Δx", "status", "message", "computing time")
     summary = _tried(problems, run.summary, {})
     rows = [(name, value) for name, value in summary.items() if name not in known and not name.startswith("remark ")]
