@@ -61,6 +61,7 @@ nb_merge_streams = True
 # Docstrings.
 autosummary_ignore_module_all = False
 autodoc_member_order = "bysource"
+autodoc_default_options = {"exclude-members": "model_config"}  # pydantic's
 autodoc_typehints_format = "short"
 python_use_unqualified_type_names = True
 napoleon_numpy_docstring = True
@@ -74,7 +75,7 @@ nitpick_ignore_regex = [(r"py:.*", r"(?!alsph\b).*")]
 nitpick_ignore = [("py:class", "alsph.config.Made")]  # a type variable
 
 PIPE = re.compile(r"``.*?``|\|")
-"""What is no literal, or the bar of \|∇·u\|, which stands for a substitution in reStructuredText."""
+"""A literal, or a bar outside of literals."""
 
 FILES = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 """Files above docs/ that are pages of the site, by their names there."""
@@ -94,13 +95,17 @@ def _entries(lines: list[str]) -> Iterator[tuple[str, str]]:
 
 def _own_parameters(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
     """Leave out of a case what all cases have from :class:`Method`, but for other defaults."""
-    lines[:] = [PIPE.sub(lambda found: found[0] if found[0] != "|" else r"\|", line) for line in lines]
     if what != "class" or not issubclass(obj, Method) or obj is Method or "Parameters" not in lines:
         return
     shared = set(_entries((Method.__doc__ or "").splitlines()))
     own = [line for entry in _entries(lines) if entry not in shared for line in entry]
     more = "Besides those of the numerical method, which all cases share: :class:`~alsph.cases.method.Method`."
     lines[lines.index("Parameters") :] = ["Parameters", "----------", *own, "", "Notes", "-----", more]
+
+
+def _bars(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Take the bars of |∇·u| as they stand; reStructuredText has them for substitutions."""
+    lines[:] = [PIPE.sub(lambda found: found[0] if found[0] != "|" else r"\|", line) for line in lines]
 
 
 def _by_name(app: Any, what: str, name: str, obj: Any, options: Any, *signature: Any) -> tuple[str, None] | None:
@@ -121,4 +126,5 @@ def setup(app: Any) -> None:
     app.connect("autodoc-process-signature", _by_name)
     app.connect("autodoc-skip-member", _not_twice)
     app.connect("source-read", _links_to_files_above)
-    app.connect("autodoc-process-docstring", _own_parameters, priority=400)  # before napoleon
+    app.connect("autodoc-process-docstring", _own_parameters, priority=300)  # both before napoleon
+    app.connect("autodoc-process-docstring", _bars, priority=400)

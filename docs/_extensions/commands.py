@@ -12,8 +12,10 @@ from sphinx.util.docutils import SphinxDirective
 from typer import Context
 from typer.main import get_command
 
-OF_A_CASE = """and the [parameters of the case](api.md#cases), with dashes: `inlet_velocity` is `--inlet-velocity`. Defaults here are
-those of the cylinder."""
+OF_A_CASE = (
+    "and the [parameters of the case](api.md#cases), with dashes: `inlet_velocity` is `--inlet-velocity`. "
+    "Defaults here are those of the cylinder."
+)
 
 
 def _plain(text: str) -> str:
