@@ -1,18 +1,18 @@
-"""Formulas as MathML, which browsers draw themselves; docutils translates them."""
+"""Formulas as MathML, which browsers draw themselves."""
 
 from typing import Any
 
 from docutils.nodes import SkipNode
-from docutils.utils.math.latex2mathml import tex2mathml
+from latex2mathml.converter import convert
 
 
 def _inline(writer: Any, node: Any) -> None:
-    writer.body.append(tex2mathml(node.astext()))
+    writer.body.append(convert(node.astext()))
     raise SkipNode
 
 
 def _display(writer: Any, node: Any) -> None:
-    writer.body.append(tex2mathml(node.astext(), as_block=True))
+    writer.body.append(convert(node.astext(), display="block"))
     raise SkipNode
 
 
