@@ -12,14 +12,15 @@ import alsph
 HERE = Path(__file__).parent
 RUNS = HERE.parent / "target" / "gallery"
 FIELDS = {
-    "cavity": "velocity",
     "body": "velocity",
     "body_3d": "velocity",
-    "nozzle": "velocity",
     "backward_facing_step": "velocity",
+    "cavity": "velocity",
+    "nozzle": "velocity",
     "pressure_jump": "pressure",
+    "taylor_green": "vorticity",
 }
-"""The field of each picture that is neither of the vorticity nor a profile."""
+"""The field of those pictures that show neither a profile nor the vorticity past a body."""
 
 
 def commands() -> dict[str, list[str]]:
@@ -42,7 +43,7 @@ def draw(case: str) -> None:
     run = alsph.open_run(RUNS / case)
     profile = next((each for each in run.profiles if case not in FIELDS and not run.body), None)
     figure = run.plot_profile(profile) if profile else run.plot_field(FIELDS.get(case, "vorticity"))
-    figure.savefig(HERE / "images" / "gallery" / f"{case}.png", dpi=70, pil_kwargs={"optimize": True})
+    figure.savefig(HERE / "images" / "gallery" / f"{case}.png", dpi=65, pil_kwargs={"optimize": True})
 
 
 if __name__ == "__main__":

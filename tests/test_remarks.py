@@ -5,7 +5,19 @@ import numpy as np
 import pytest
 import shapely
 from alsph import Run
-from alsph.cases import CASES, BackwardFacingStep, Bodies, Body, Cavity, Cylinder, Poiseuille, TaylorGreen, remarks
+from alsph.cases import (
+    CASES,
+    BackwardFacingStep,
+    Bodies,
+    Body,
+    Body3D,
+    Cavity,
+    Cylinder,
+    Poiseuille,
+    Sphere,
+    TaylorGreen,
+    remarks,
+)
 from alsph.geometry.thin import carried
 from alsph.results.outcome import outcome
 from shapely import Point, affinity
@@ -16,7 +28,7 @@ def about(case):
     return remarks.keywords(case.remarks())
 
 
-@pytest.mark.parametrize("name", [name for name in CASES if name not in ("body", "cylinder_pair")])
+@pytest.mark.parametrize("name", [name for name in CASES if name not in ("body", "cylinder_pair", "sphere", "body_3d")])
 def test_cases_as_they_come_need_no_remark(name):
     assert CASES[name]().remarks() == []
 
@@ -59,6 +71,9 @@ def test_what_has_been_compared_with_references_needs_no_remark(case):
         (Cylinder(length=3.0, height=13.0, upstream=1.5), "short channel"),
         (Cylinder(height=5.0), "narrow channel"),
         (Body(), "not validated"),
+        (Sphere(), "coarse"),
+        (Sphere(reynolds=300, resolution=30), "not validated"),
+        (Body3D(reynolds=100, resolution=20), "not validated"),
         (Body(shape="naca0012"), "thin parts, thin body, not validated"),
     ],
 )

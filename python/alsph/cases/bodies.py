@@ -142,15 +142,13 @@ class Bodies(Channel):
 
     def remarks(self) -> list[str]:
         """Return what is to be said of the resolution, the method, the channel and parts of the body."""
-        what = "this body; it has" if len(self.outlines) == 1 else "these bodies; they have"
-        unknown = f"not validated: flow past {what} not been compared with the results of others"
         thin = [
             remark
             for name, outline, left in zip(self.coefficient_bodies, self.outlines, self.carried, strict=True)
             for remark in remarks.thin(name, outline, left, self.particle_spacing)
         ]
         near = remarks.gaps(self.coefficient_bodies, self.carried, self.particle_spacing)
-        return [*super().remarks(), *thin, *near, unknown]
+        return [*super().remarks(), *thin, *near, *remarks.unknown(len(self.outlines) > 1)]
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces on all bodies together, the Strouhal number, and the mean forces on each of several."""

@@ -270,6 +270,12 @@ def _coarsest(shape: Polygon, thick: float) -> int:
     return enough
 
 
+def unknown(several: bool = False) -> list[str]:
+    """Remark on a body that nothing is known of."""
+    what = "these bodies; they have" if several else "this body; it has"
+    return [f"not validated: flow past {what} not been compared with the results of others"]
+
+
 def derived(model: type) -> list[str]:
     """Remark on a class of the user's that derives from a shipped case, with whose reference it may be compared."""
     shipped = [base for base in model.__mro__ if base.__module__.startswith("alsph.cases.") and "title" in vars(base)]

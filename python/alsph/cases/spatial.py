@@ -109,7 +109,7 @@ class Spatial(Channel):
     def remarks(self) -> list[str]:
         """Return what is to be said of the resolution, the method, the channel and parts of the body."""
         thin = remarks.thin_in_space(self.body_name, self._volume, self.particle_spacing)
-        return [*super().remarks(), *thin]
+        return [*super().remarks(), *thin, *([] if self.validated else remarks.unknown())]
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces on the body and the Strouhal number; of a quarter the drag alone."""

@@ -231,11 +231,12 @@ class Run(Loads):
             or of the flow.
         """
         _plotting().field_style(name)
-        options = {"limit": limit, "view": view, "title": self._title, "plane": self._plane(plane)}
+        options = {"limit": limit, "view": view, "title": self._title, "plane": self.plane(plane)}
         figure = _plotting().field(self.snapshot(time), name, self.spacing, **options)
         return self._saved(figure, path, headed=True)
 
-    def _plane(self, given: str | None) -> Plane | None:
+    def plane(self, given: str | None) -> Plane | None:
+        """Return the plane of pictures in 3-D, None in 2-D; `given` as of :meth:`plot_field`."""
         case = self.config.case
         if case.space_dimensions == 2:
             if given is not None:
@@ -266,7 +267,7 @@ class Run(Loads):
         ConfigError
             If there are fewer than two snapshots, or an option cannot be used.
         """
-        options["plane"] = self._plane(options.get("plane"))
+        options["plane"] = self.plane(options.get("plane"))
         if path is None:
             check_folder(self.path / "figures")
         target: Path = _plotting().Film(path if path is not None else self.path / "figures" / f"{name}.gif")

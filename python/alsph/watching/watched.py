@@ -97,7 +97,7 @@ class Watched:
                 *_tried(problems, lambda: _forces(run), []),
                 *_tried(problems, lambda: _numerics(run), []),
             ],
-            "fields": _fields(run),
+            "fields": list(plotting.FIELDS),
             "snapshot": _mark(self.path / "particles.vtkhdf"),
             "figures": self._figures(),
             "problems": list(dict.fromkeys(problems)),
@@ -247,11 +247,6 @@ def _thinned(values: FloatArray) -> list[float | None]:
     return [float(f"{value:.6g}") if math.isfinite(value) else None for value in values.tolist()]
 
 
-def _fields(run: Run) -> list[str]:
-    """Return the fields that can be drawn: in 3-D none."""
-    return [] if run.case.get("dimensions") == 3 else list(plotting.FIELDS)
-
-
 def _judged(run: Run, problems: list[str]) -> dict[str, Any]:
     """Return what ``alsph info`` tells, the window, the means that are drawn, and the remarks."""
     known = ("case", "Reynolds number", "resolution, D/Δx", "status", "message", "computing time")
@@ -284,7 +279,7 @@ def _png(run: Run, field: str, width: float, ink: str) -> bytes:
     grounds = ("figure.facecolor", "axes.facecolor", "savefig.facecolor")
     settings: dict[Any, str] = dict.fromkeys(inked, ink) | dict.fromkeys(grounds, "none")
     with matplotlib.rc_context(settings):
-        figure = plotting.field(run.snapshot(), field, run.spacing, width=width)
+        figure = plotting.field(run.snapshot(), field, run.spacing, width=width, plane=run.plane(None))
         file = io.BytesIO()
         figure.savefig(file, format="png", dpi=150, bbox_inches="tight")
     return file.getvalue()
