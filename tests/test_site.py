@@ -86,7 +86,7 @@ def test_a_case_of_the_gallery_has_a_command_a_picture_and_its_time(case):
     (picture,) = re.findall(r"!\[.+\]\((.+)\)", section)
     assert 5_000 < (DOCS / picture).stat().st_size < 100_000
     assert re.search(r"\d s of one core", section) and "ompared with" in section
-    name, *words = shlex.split(command)
+    name, *words = shlex.split(re.sub(r"(--[\w-]+)(?= --|$)", r"\1 true", command))  # a flag
     options = {word[2:].replace("-", "_"): number(value) for word, value in zip(words[::2], words[1::2], strict=True)}
     run = {option: options.pop(option) for option in RunSettings.model_fields.keys() & options.keys()}
     made = config.from_tables({"case": name, "run": run, **options})

@@ -20,7 +20,7 @@ from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
 from alsph.folder.durable import check_folder
 from alsph.folder.run_folder import RunFolder
-from alsph.geometry.particles import Field
+from alsph.geometry.particles import Field, Snapshot
 from alsph.geometry.plane import Plane
 from alsph.parameters import choose
 from alsph.results.dimensional import dimensional
@@ -231,18 +231,20 @@ class Run(Loads):
             or of the flow.
         """
         _plotting().field_style(name)
-        options = {"limit": limit, "view": view, "title": self._title, "plane": self.plane(plane)}
-        figure = _plotting().field(self.snapshot(time), name, self.spacing, **options)
+        snapshot = self.snapshot(time)
+        plane_of = self.plane(snapshot, plane)
+        figure = _plotting().field(
+            snapshot, name, self.spacing, limit=limit, view=view, title=self._title, plane=plane_of
+        )
         return self._saved(figure, path, headed=True)
 
-    def plane(self, given: str | None) -> Plane | None:
-        """Return the plane of pictures in 3-D, None in 2-D; `given` as of :meth:`plot_field`."""
-        case = self.config.case
-        if case.space_dimensions == 2:
+    def plane(self, snapshot: Snapshot, given: str | None = None) -> Plane | None:
+        """Return the plane of pictures of a snapshot, None in 2-D; `given` as of :meth:`plot_field`."""
+        if snapshot.position.shape[1] == 2:
             if given is not None:
                 raise ConfigError(f"plane = {shown(given)}: the run is in 2-D; leave it out")
             return None
-        return Plane.of(given, case.middle)
+        return Plane.of(given, self.config.case.middle)
 
     def animate(self, name: Field = "vorticity", path: str | Path | None = None, **options: Any) -> Path:
         """Make a film of a field from the snapshots.
@@ -267,7 +269,8 @@ class Run(Loads):
         ConfigError
             If there are fewer than two snapshots, or an option cannot be used.
         """
-        options["plane"] = self.plane(options.get("plane"))
+        if len(self.times):
+            options["plane"] = self.plane(self.snapshot(self.times[0]), options.get("plane"))
         if path is None:
             check_folder(self.path / "figures")
         target: Path = _plotting().Film(path if path is not None else self.path / "figures" / f"{name}.gif")

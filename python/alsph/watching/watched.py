@@ -279,7 +279,8 @@ def _png(run: Run, field: str, width: float, ink: str) -> bytes:
     grounds = ("figure.facecolor", "axes.facecolor", "savefig.facecolor")
     settings: dict[Any, str] = dict.fromkeys(inked, ink) | dict.fromkeys(grounds, "none")
     with matplotlib.rc_context(settings):
-        figure = plotting.field(run.snapshot(), field, run.spacing, width=width, plane=run.plane(None))
+        snapshot = run.snapshot()
+        figure = plotting.field(snapshot, field, run.spacing, width=width, plane=run.plane(snapshot))
         file = io.BytesIO()
         figure.savefig(file, format="png", dpi=150, bbox_inches="tight")
     return file.getvalue()
