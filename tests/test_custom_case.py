@@ -1,5 +1,6 @@
 """A case of another package or of a file: in the command line, in studies, in run folders; what is wrong with one."""
 
+import dataclasses
 import functools
 import os
 import subprocess
@@ -294,7 +295,7 @@ class Turning(cases.Couette):
     keeps: bool = Field(default=False, description="whether the body has no velocity of its own")
 
     def bodies(self):
-        return [body | ({"velocity": None} if self.keeps else {}) for body in super().bodies()]
+        return [dataclasses.replace(body, velocity=None) if self.keeps else body for body in super().bodies()]
 
     def particles(self):
         state = super().particles()
@@ -306,12 +307,12 @@ class Turning(cases.Couette):
 def test_velocities_of_solid_particles_that_are_not_used_are_warned_of():
     case = Turning(resolution=8)
     body = case.bodies()[0]
-    with pytest.warns(UserWarning, match=rf"Turning: .*'{body['name']}' are not used.*say None there"):
+    with pytest.warns(UserWarning, match=rf"Turning: .*'{body.name}' are not used.*say None there"):
         simulation = case.simulation(threads=1)
     simulation.advance(1)
     state = simulation.state()
     lower = (state["kind"] == Kind.SOLID) & (state["body"] == 0)
-    assert np.allclose(state["velocity"][lower], body["velocity"])  # indeed
+    assert np.allclose(state["velocity"][lower], body.velocity)  # indeed
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         kept = case.replace(keeps=True).simulation(threads=1)

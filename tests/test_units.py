@@ -193,7 +193,7 @@ def test_names_of_results_in_si():
         "pressure jump, ρU²": Estimate(1.0),
         "kinetic energy against the stream, ρU²D²/8": Estimate(1.0),
     }
-    found = dimensional(results, units, 2, chord=0.5)
+    found = dimensional(results, units, 2, area=1.0, chord=0.5)
     assert found == pytest.approx(
         {
             "time reached, s": 2.0,
@@ -211,7 +211,8 @@ def test_names_of_results_in_si():
     )
     drag = found["mean drag, pressure part, N/m"]
     assert (drag.uncertainty, drag.note) == (pytest.approx(4.5), "a note")
-    assert dimensional(results, units, 3, 1.0)["mean drag, pressure part, N"] == pytest.approx(90.0)
+    in_space = dimensional(results, units, 3, area=0.5, chord=1.0)
+    assert in_space["mean drag, pressure part, N"] == pytest.approx(45.0)
 
 
 def test_wrong_quantities_are_told():
