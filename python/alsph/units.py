@@ -42,11 +42,6 @@ QUANTITIES: dict[Quantity, tuple[str, tuple[int, int, int]]] = {
 class Units(Parameters):
     """What the reference values of a case are in SI; from them follows its Reynolds number.
 
-    Attributes
-    ----------
-    reynolds : float
-        UD/ν [-].
-
     Raises
     ------
     ConfigError

@@ -124,7 +124,7 @@ class Watched:
         Parameters
         ----------
         field : str
-            One of :data:`alsph.plotting.FIELDS`.
+            One of the names in ``alsph.plotting.FIELDS``.
         width : {"wide", "narrow"}
         ink : {"light", "dark"}
             For what kind of page.
