@@ -7,31 +7,26 @@ import math
 import re
 import warnings
 from abc import abstractmethod
-from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, model_validator
+from numpy.typing import NDArray
+from pydantic import Field
 
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
-from alsph.cases.dimensional import Dimensional
+from alsph.cases.driven import RULES, Driven
 from alsph.cases.method import Method
 from alsph.engine.output import Output
-from alsph.engine.prescribed import Rule, asked
 from alsph.engine.problem import Problem
 from alsph.engine.simulation import Simulation, bytes_per_particle, time_step_limits
 from alsph.errors import ConfigError
-from alsph.expressions import VectorExpression
-from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
 from alsph.memory import check
-from alsph.text import shown
 
 if TYPE_CHECKING:
     from alsph.results.run import Run
@@ -39,9 +34,6 @@ if TYPE_CHECKING:
 VELOCITY_LIMIT = 50.0
 """Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
 
-
-RULES = {"inflow": "inlet_velocity", "forcing": "driving_force", "sliding": "surface_velocity"}
-"""What a case may prescribe by place and time: a method in Python, and the parameter that holds an expression."""
 
 WORD = re.compile(r"(?<=[a-z0-9])(?=[A-Z][a-z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[a-z])(?=[A-Z])")
 """Where a new word begins in the name of a class."""
@@ -58,7 +50,7 @@ def title_of(model: type) -> str:
     return first[:1].lower() + first[1:] or name_of(model)
 
 
-class Case(Dimensional):
+class Case(Driven):
     """A flow problem with its numerical parameters.
 
     Every case is computed in its own reference units: lengths in D, velocities in U, density in ρ, hence times in D/U,
@@ -79,34 +71,11 @@ class Case(Dimensional):
     """The Python file of the user's that it stands in, a :class:`alsph.cases.source.Source`."""
 
     resolution: int = Field(default=20, ge=8, description="particles per reference length, D/Δx [-]")
-    inlet_velocity: str | None = Field(
-        default=None,
-        description="velocity at the inlets by place and time, as '1 + 0.2*sin(2*pi*t/5), 0'; none: uniform, U [U]",
-    )
-    driving_force: str | None = Field(
-        default=None, description="a further body force per unit mass by place and time, as '0.1*sin(t), 0' [U²/D]"
-    )
-    surface_velocity: str | None = Field(
-        default=None,
-        description="velocity of the surfaces of bodies in place, by place and time, as '-2*y, 2*(x - 4)' [U]",
-    )
-
-    @model_validator(mode="after")
-    def _expressions_are_vectors(self) -> Self:
-        for name in self._expressions:
-            method = next(method for method, parameter in RULES.items() if parameter == name)
-            if self._overrides(method):
-                raise ConfigError(f"{name}: {type(self).__name__} says that itself, by its method `{method}`")
-        if self.inlet_velocity is not None and not any(self.checked_domain.inlets()):
-            raise ConfigError(f"inlet_velocity = {shown(self.inlet_velocity)}: {self.name} has no inlet")
-        if self.surface_velocity is not None and all(body.moves for body in self.checked_bodies):
-            raise ConfigError(f"surface_velocity = {shown(self.surface_velocity)}: {self.name} has no body in place")
-        return self
 
     @classmethod
     def parameter_names(cls) -> list[str]:
-        """Return the names of the parameters, those of the problem before those of the numerical method."""
-        return sorted(cls.model_fields, key=lambda name: name in Method.model_fields)
+        """Return the names of the parameters: those of the problem, what drives it, and the numerical method's."""
+        return sorted(cls.model_fields, key=lambda name: (name in Method.model_fields, name in RULES.values()))
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
@@ -129,11 +98,6 @@ class Case(Dimensional):
         return 2.0 * max(self.checked_domain.size)
 
     @property
-    def space_dimensions(self) -> int:
-        """Number of space dimensions, 2 or 3."""
-        return self.in_space
-
-    @property
     def largest_time_step(self) -> float:
         """Upper bound of the time step, which all steps have that are not adaptive [Δx/U]."""
         if self.time_step or not self.courant:
@@ -149,14 +113,6 @@ class Case(Dimensional):
     def reference_area(self) -> float:
         """What force coefficients are formed with: a length in 2-D [D], an area in 3-D [D²]."""
         return 1.0
-
-    def body_force(self) -> list[float]:
-        """Return the body force per unit mass (d,) [U²/D]."""
-        return [0.0] * self.space_dimensions
-
-    @abstractmethod
-    def domain(self) -> Domain:
-        """Return the domain and what closes its sides."""
 
     @abstractmethod
     def particles(self) -> dict[str, NDArray[Any]]:
@@ -176,137 +132,10 @@ class Case(Dimensional):
         ]
         return round(math.prod(columns))
 
-    def bodies(self) -> list[SolidBody]:
-        """Return the solid bodies."""
-        return []
-
-    @cached_property
-    def checked_domain(self) -> Domain:
-        """What :meth:`domain` gives, which in older cases is a table."""
-        domain = Domain.of(self.domain())
-        if domain.dimensions != self.space_dimensions:
-            told = f"its domain is in {domain.dimensions}-D and the case in {self.space_dimensions}-D"
-            raise ConfigError(f"{self.name}: {told}; correct `domain` or `space_dimensions`")
-        return domain
-
-    @cached_property
-    def checked_bodies(self) -> list[SolidBody]:
-        """What :meth:`bodies` gives, which in older cases are tables."""
-        return [SolidBody.of(body) for body in self.bodies()]
-
     @property
     def coefficient_bodies(self) -> list[str]:
         """Names of the bodies that drag and lift are those of, all together."""
         return []
-
-    def inflow(self, position: FloatArray, time: float) -> ArrayLike | None:
-        """Return the velocity of the inlet particles, which is asked for before every step.
-
-        A case without this method gives them their velocities in :meth:`particles`: they keep them and hand them on to
-        those that follow, unless ``inlet_velocity`` is given.
-
-        Parameters
-        ----------
-        position
-            Any positions (m, d) [D].
-        time
-            Any time [D/U].
-
-        Returns
-        -------
-        array or None
-            Velocities (m, d), or one (d,), by position and time alone [U]; None: those that they have.
-        """
-        return self._given("inlet_velocity", position, time)
-
-    def forcing(self, position: FloatArray, time: float) -> ArrayLike | None:
-        """Return a body force per unit mass beside :meth:`body_force`, which is asked for in every step.
-
-        By default it is ``driving_force``, if that is given. The time step does not follow it.
-
-        Parameters
-        ----------
-        position
-            Any positions (n, d) [D].
-        time
-            Any time [D/U].
-
-        Returns
-        -------
-        array
-            Forces (n, d), or one (d,), by position and time alone [U²/D].
-        """
-        return self._given("driving_force", position, time)
-
-    def body_force_at(self, position: FloatArray, time: float) -> FloatArray:
-        """Return the whole body force per unit mass (n, d) at positions (n, d) [D] and a time [D/U]: [U²/D]."""
-        constant = np.broadcast_to(np.array(self.body_force(), float), position.shape)
-        rule = self.rules.get("forcing")
-        changing = asked("forcing", rule, position, time) if rule else None
-        return constant if changing is None else constant + changing
-
-    def sliding(self, position: FloatArray, time: float) -> ArrayLike | None:
-        """Return the velocity of the surfaces of bodies that stay in place, which is asked for in every step.
-
-        By default it is ``surface_velocity``, if that is given. It takes the place of the ``velocity`` of those of
-        :meth:`bodies` that do not move.
-
-        Parameters
-        ----------
-        position
-            Any positions (m, d) [D].
-        time
-            Any time [D/U].
-
-        Returns
-        -------
-        array
-            Velocities (m, d), or one (d,), by position and time alone [U].
-        """
-        return self._given("surface_velocity", position, time)
-
-    def _given(self, name: str, position: FloatArray, time: float) -> FloatArray | None:
-        expression = self._expressions.get(name)
-        return expression(position, time) if expression else None
-
-    @cached_property
-    def _expressions(self) -> dict[str, VectorExpression]:
-        """The vectors that are given as expressions, by parameter."""
-        numbers = {
-            name: float(value)
-            for name in type(self).model_fields.keys() - Method.model_fields.keys()
-            if isinstance(value := getattr(self, name), int | float) and not isinstance(value, bool)
-        }
-        found = {}
-        for name in RULES.values():
-            if (text := getattr(self, name)) is not None:
-                try:
-                    found[name] = VectorExpression(text, self.space_dimensions, numbers)
-                except ValueError as error:
-                    raise ConfigError(f"{name} = {shown(text)}: {error}") from None
-        return found
-
-    @property
-    def rules(self) -> dict[str, Rule]:
-        """What the case prescribes by functions of place and time: ``inflow``, ``forcing``, ``sliding``."""
-        return {
-            name: getattr(self, name)
-            for name, parameter in RULES.items()
-            if self._overrides(name) or getattr(self, parameter) is not None
-        }
-
-    @property
-    def is_driven(self) -> bool:
-        """Whether an expression, not of the class's own, makes the flow another one than its references are of."""
-        return bool(self._driven_by)
-
-    @property
-    def _driven_by(self) -> list[str]:
-        return [name for name in self._expressions if getattr(self, name) != type(self).model_fields[name].default]
-
-    @classmethod
-    def _overrides(cls, name: str) -> bool:
-        return getattr(cls, name) is not getattr(Case, name)
 
     def surface_points(self) -> Surface | None:
         """Return where the surface pressure is sampled."""

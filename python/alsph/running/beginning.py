@@ -12,7 +12,8 @@ import numpy as np
 
 from alsph import cases
 from alsph.analysis import sampling
-from alsph.cases.base import RULES, Case
+from alsph.cases.base import Case
+from alsph.cases.driven import RULES
 from alsph.cases.source import shown_name
 from alsph.config import Config
 from alsph.engine.prescribed import WORDS, difference
