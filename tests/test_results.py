@@ -262,6 +262,16 @@ def test_loads_are_those_of_all_bodies_together_or_of_the_first_wall(tmp_path):
             assert run.moment_coefficient("pressure", about=behind) == pytest.approx(1.5 * share * lift / 2**2)
 
 
+def test_another_reference_area_changes_forces_and_no_moments(folder, monkeypatch):
+    def found():
+        run = Run(folder)
+        return run.coefficient("y"), run.moment_coefficient(about=(0, 1))
+
+    lift, moment = found()
+    monkeypatch.setattr(Cylinder, "reference_area", 0.25)
+    assert found()[0] == pytest.approx(4 * lift) and found()[1] == pytest.approx(moment) and np.abs(moment).max() > 1
+
+
 def test_the_summary_of_a_run(folder):
     run = Run(folder)
     shown = {name: str(value) for name, value in run.summary().items()}

@@ -155,8 +155,10 @@ def test_bodies_too_thin_are_refused_and_thin_parts_remarked_on():
         assert not any("thin" in remark for remark in case.remarks())
 
 
-def test_a_quarter_is_refused_of_what_is_no_image_of_itself():
+def test_a_quarter_has_a_drag_alone_and_is_refused_of_what_is_no_image_of_itself(tmp_path):
     wedge = trimesh.creation.box((1.0, 1.0, 0.5))
+    run = Body3D(**SMALL, quarter=True).run(tmp_path / "run", until=0.02, progress=False)
+    assert run.measures and all("drag" in measure.name for measure in run.measures)
     with pytest.raises(ConfigError, match="quarter = true: the body is not its own mirror image in y and in z"):
         Body3D(shape=wedge, angle_of_attack=10.0, quarter=True)
 

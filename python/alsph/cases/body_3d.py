@@ -54,5 +54,6 @@ class Body3D(Spatial):
         return cube(self.scale, self.angle_of_attack)
 
     def measures(self, run: Record) -> list[Measure]:
-        """Return the forces, also the mean lift."""
-        return [*super().measures(run), Measure("mean lift coefficient", run.lift.mean)]
+        """Return the forces, also the mean lift; of a quarter the drag alone."""
+        lift = [] if self.quarter else [Measure("mean lift coefficient", run.lift.mean)]
+        return [*super().measures(run), *lift]

@@ -62,14 +62,17 @@ class Loads(Fields):
         ConfigError
             If there is no such direction, part or body.
         """
+        return 2.0 * self._force(axis, part, body) / self.config.case.reference_area
+
+    def _force(self, axis: str, part: str, body: str | None) -> FloatArray:
+        """Force in every step (steps,) [ρU²D^(d-1)], arguments as in :meth:`coefficient`."""
         axes = [name for name in AXES if name != "z" or self.config.case.space_dimensions == 3]
         if axis not in axes:
             raise ConfigError(f"axis = {shown(axis)}: unknown; known: {', '.join(axes)}; the drag is x and the lift y")
         names, parts = self._chosen(body, part)
         columns = [self.history.get(f"{name}_{each}_force_{axis}") for each in parts for name in names or [""]]
         missing = np.full(len(self.history["time"]), np.nan)
-        force = sum((missing if column is None else column for column in columns), np.zeros_like(missing))
-        return 2.0 * force / self.config.case.reference_area
+        return sum((missing if column is None else column for column in columns), np.zeros_like(missing))
 
     @cached_property
     def window(self) -> Window:
@@ -136,10 +139,10 @@ class Loads(Fields):
         moment = np.zeros_like(missing)
         for name in names:
             for each in parts:
-                moment += 2.0 * self.history.get(f"{name}_{each}_torque", missing)
+                moment += self.history.get(f"{name}_{each}_torque", missing)
             arm = np.subtract(centres.get(name, np.nan), point)
-            moment += arm[0] * self.coefficient("y", part, name) - arm[1] * self.coefficient("x", part, name)
-        return -moment / case.chord**2
+            moment += arm[0] * self._force("y", part, name) - arm[1] * self._force("x", part, name)
+        return -2.0 * moment / case.chord**2
 
     def moment(self, about: Sequence[float] | None = None, body: str | None = None) -> Load:
         """Pitching moment coefficient over the averaging window (arguments as in :meth:`moment_coefficient`)."""
