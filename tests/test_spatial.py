@@ -75,8 +75,8 @@ def test_a_mesh_of_a_sphere_is_a_sphere():
     mesh = Mesh.of(BALL).volume(scale=1.0)
     points = np.random.default_rng(1).uniform(-0.7, 0.7, (500, 3))
     assert mesh.height(points) == pytest.approx(sphere(0.5).height(points), abs=3e-3)
-    assert mesh.slope(points) == pytest.approx(sphere(0.5).slope(points), abs=0.15)
-    assert np.linalg.norm(mesh.slope(points), axis=1) == pytest.approx(1)
+    assert mesh.surface(points)[1] == pytest.approx(sphere(0.5).surface(points)[1], abs=0.15)
+    assert np.linalg.norm(mesh.surface(points)[1], axis=1) == pytest.approx(1)
     assert (mesh.volume, mesh.frontal_area) == pytest.approx((np.pi / 6, np.pi / 4), rel=0.01)
     assert len(mesh.flips) == 2
     assert len(mesh.solid(0.1, 4).position) == len(sphere(0.5).solid(0.1, 4).position)

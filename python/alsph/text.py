@@ -1,6 +1,7 @@
 """Texts of others, such as names, paths and what files hold: read with bounds, and shown without harm; durations."""
 
 import errno
+import hashlib
 import os
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,11 @@ def shown(value: Any, longest: int = LONGEST_VALUE) -> str:
     except (ValueError, RecursionError):  # numbers of thousands of digits, tables nested without end
         return f"a {type(value).__name__} too long to be shown"
     return text if len(text) <= longest else f"{text[: longest - 4]} ..."
+
+
+def sha256(text: str) -> str:
+    """Return the SHA-256 of a text, in hexadecimal."""
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def duration(seconds: float) -> str:

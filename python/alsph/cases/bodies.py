@@ -16,7 +16,6 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.channel import Channel
-from alsph.cases.remarks import TOO_THIN
 from alsph.errors import ConfigError
 from alsph.geometry.outline import Outline
 from alsph.geometry.packing import Planar, pack
@@ -87,7 +86,7 @@ class Bodies(Channel):
     @cached_property
     def _refusal(self) -> str:
         """Why the resolution does not carry the bodies, empty if it does."""
-        return next((remark for remark in self.remarks() if remark.startswith(TOO_THIN)), "")
+        return remarks.refusal(self.remarks())
 
     @cached_property
     def _solids(self) -> list[Solid]:

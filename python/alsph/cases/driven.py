@@ -136,19 +136,7 @@ class Driven(Dimensional):
         """Return the velocity of the surfaces of bodies that stay in place, which is asked for in every step.
 
         By default it is ``surface_velocity``, if that is given. It takes the place of the ``velocity`` of those of
-        :meth:`bodies` that do not move.
-
-        Parameters
-        ----------
-        position
-            Any positions (m, d) [D].
-        time
-            Any time [D/U].
-
-        Returns
-        -------
-        array
-            Velocities (m, d), or one (d,), by position and time alone [U].
+        :meth:`bodies` that do not move. Arguments and velocities are as those of :meth:`inflow`.
         """
         return self._given("surface_velocity", position, time)
 

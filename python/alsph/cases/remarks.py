@@ -68,6 +68,11 @@ def tally(runs: Sequence[str]) -> str:
     return ", ".join(f"{word}: {count} of {len(runs)} runs" for word, count in words.items())
 
 
+def refusal(remarks: Iterable[str]) -> str:
+    """Return why the resolution does not carry a body, empty if it does."""
+    return next((remark for remark in remarks if remark.startswith(TOO_THIN)), "")
+
+
 def brief(remarks: Iterable[str]) -> str:
     """Return the remarks without what explains them, for a line below a picture."""
     return "  |  ".join(remark.partition(";")[0] for remark in remarks)

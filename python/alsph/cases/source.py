@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import inspect
 import linecache
 import os
@@ -18,7 +17,7 @@ from pydantic import Field, model_validator
 from alsph.cases.base import Case, name_of, title_of
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters, suggest
-from alsph.text import contents, shown
+from alsph.text import contents, sha256, shown
 
 LARGEST_FILE = 2**20
 """Size of the largest file that is read [bytes]."""
@@ -41,7 +40,7 @@ class Source(Parameters):
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
-        if self.sha256 != _sha256(self.text):
+        if self.sha256 != sha256(self.text):
             raise ValueError(f"{self.file}: the text is not that which its sha256 is of")
         return self
 
@@ -135,7 +134,7 @@ def _own(module: ModuleType) -> list[type[Case]]:
 
 def _module(file: str, text: str) -> ModuleType:
     """Return the module of a file, which is run once."""
-    name = f"alsph_file_{_sha256(file + text)[:16]}"
+    name = f"alsph_file_{sha256(file + text)[:16]}"
     if name in sys.modules:
         return sys.modules[name]
     # Messages of Python show lines of the text as it was run, whatever the file holds by then.
@@ -144,7 +143,7 @@ def _module(file: str, text: str) -> ModuleType:
     try:
         exec(compile(text, file, "exec"), vars(module))
         for model in _own(module):
-            _complete(model, Source(file=file, name=model.__name__, sha256=_sha256(text), text=text))
+            _complete(model, Source(file=file, name=model.__name__, sha256=sha256(text), text=text))
     except (Exception, SystemExit) as error:
         del sys.modules[name]
         raise ConfigError(f"{file}: {reason(error, file)}") from None
@@ -178,7 +177,3 @@ def reason(error: BaseException, file: str) -> str:
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
     where, first = f"line {lines[-1]}: " if lines else "", str(error).partition("\n")[0]
     return f"{where}{type(error).__name__}: {first}{hint}"
-
-
-def _sha256(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()

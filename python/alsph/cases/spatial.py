@@ -102,14 +102,18 @@ class Spatial(Channel):
 
     @cached_property
     def _solids(self) -> list[Solid]:
-        if refusal := next((remark for remark in self.remarks() if remark.startswith(remarks.TOO_THIN)), ""):
+        if refusal := remarks.refusal(self._thin):
             raise ConfigError(refusal)
         return [self._volume.solid(self.particle_spacing, self.support_layers)]
 
+    @cached_property
+    def _thin(self) -> list[str]:
+        """What is to be said of thin parts: many distances, so it is found once."""
+        return remarks.thin_in_space(self.body_name, self._volume, self.particle_spacing)
+
     def remarks(self) -> list[str]:
         """Return what is to be said of the resolution, the method, the channel and parts of the body."""
-        thin = remarks.thin_in_space(self.body_name, self._volume, self.particle_spacing)
-        return [*super().remarks(), *thin, *([] if self.validated else remarks.unknown())]
+        return [*super().remarks(), *self._thin, *([] if self.validated else remarks.unknown())]
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces on the body and the Strouhal number; of a quarter the drag alone."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from functools import cached_property
 from io import StringIO
@@ -14,9 +13,9 @@ from pydantic import Field, model_validator
 
 from alsph.arrays import FloatArray
 from alsph.errors import ConfigError
-from alsph.geometry.volume import Volume
-from alsph.parameters import Parameters
-from alsph.text import shown
+from alsph.geometry.shape import Shape
+from alsph.geometry.volume import Volume, nose_up
+from alsph.text import printable, sha256, shown
 
 FORMATS = (".stl", ".ply", ".obj", ".off")
 LARGEST_FILE = 2**28
@@ -26,16 +25,12 @@ MOST_TRIANGLES = 50_000
 UNREADABLE = "holds no triangles that can be read; is it whole, and of the format that its name says?"
 
 
-class Mesh(Parameters):
+class Mesh(Shape):
     """The triangles of a closed surface. A run folder holds them, and so needs no file beside it."""
 
     FORMS: ClassVar[str] = "must be a trimesh.Trimesh, or vertices (n, 3) and triangles (m, 3) of their indices"
 
-    file: str = Field(description="name of the file that they were read from")
-    sha256: str = Field(description="SHA-256 of the triangles as they are written here")
-    triangles: str = Field(
-        description="a line `v x y z` a vertex, and `f i j k` a triangle, as in an OBJ file", repr=False
-    )
+    triangles: str = Field(description="a line `v x y z` a vertex, and `f i j k` a triangle, as in an OBJ file")
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Self:
@@ -47,7 +42,7 @@ class Mesh(Parameters):
             If it holds no closed surface; the message names the file.
         """
         trimesh = _library()
-        name = shown(os.path.basename(path)).strip("'")
+        name = printable(os.path.basename(path))
         if not os.path.isfile(path):
             raise ConfigError(f"{shown(path)}: no such file")
         if os.path.getsize(path) > LARGEST_FILE:
@@ -99,11 +94,11 @@ class Mesh(Parameters):
         lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in mesh.vertices]
         lines += [f"f {i} {j} {k}" for i, j, k in mesh.faces + 1]
         text = "\n".join([*lines, ""])
-        return cls(file=name, sha256=_sha256(text), triangles=text)
+        return cls(file=name, sha256=sha256(text), triangles=text)
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
-        if _sha256(self.triangles) != self.sha256:
+        if sha256(self.triangles) != self.sha256:
             raise ValueError(f"{self.file}: the triangles are not those of the SHA-256 beside them")
         return self
 
@@ -128,9 +123,7 @@ class Mesh(Parameters):
         """
         mesh = self.surface
         extent = float(np.ptp(mesh.vertices, axis=0).max())
-        vertices = (np.asarray(mesh.vertices) - mesh.center_mass) * (scale / extent)
-        c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-        vertices = vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]).T
+        vertices = (np.asarray(mesh.vertices) - mesh.center_mass) * (scale / extent) @ nose_up(angle).T
         triangles = np.asarray(mesh.faces, np.int64)
 
         def nearest(points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -142,7 +135,7 @@ class Mesh(Parameters):
             upper=vertices.max(axis=0),
             volume=float(mesh.volume) * (scale / extent) ** 3,
             frontal_area=_shadow(vertices, triangles),
-            nearest=lambda points: nearest(points)[1],
+            nearest=nearest,
         )
 
 
@@ -154,10 +147,6 @@ def _library() -> Any:
         raise ConfigError("a mesh needs the packages trimesh and libigl; pip install 'alsph[meshes]'") from None
     del igl
     return trimesh
-
-
-def _sha256(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _nearest(vertices: FloatArray, triangles: NDArray[np.int64], points: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -6,7 +6,6 @@ the points into parts. Which parts make a curve, the shortest edges that close t
 bodies), upper and lower side from the leading edge on (Lednicer's order), or one after the other.
 """
 
-import hashlib
 import math
 import os
 import re
@@ -25,7 +24,8 @@ from pydantic import Field, model_validator
 
 from alsph.errors import ConfigError
 from alsph.geometry import drawing
-from alsph.parameters import Parameters
+from alsph.geometry.shape import Shape
+from alsph.text import sha256
 
 LARGEST_FILE = 2**20
 """Size of the largest file that is read [bytes]; outlines have some kilobytes."""
@@ -88,13 +88,11 @@ class Part:
     points: list[Line] = field(default_factory=list)
 
 
-class Outline(Parameters):
+class Outline(Shape):
     """The closed curves of one body or of several. A run folder holds them, and so needs no file beside it."""
 
     FORMS: ClassVar[str] = "must be points (n, 2) of a closed curve, a list of such arrays, or shapely's polygons"
 
-    file: str = Field(description="name of the file that they were read from")
-    sha256: str = Field(description="SHA-256 of the points as they are written here")
     points: str = Field(description="a point a line, x and y [D], and a blank line between two bodies")
     remark: str = Field(default="", description="what was left out")
 
@@ -155,11 +153,11 @@ class Outline(Parameters):
         bodies, remarks = zip(*(_closed(curve, name) for curve in curves), strict=True)
         all_corners = [shapely.get_coordinates(body.exterior)[:-1].tolist() for body in bodies]
         points = "\n".join("".join(f"{x!r} {y!r}\n" for x, y in corners) for corners in all_corners)
-        return cls(file=name, sha256=_sha256(points), points=points, remark="; ".join(filter(None, remarks)))
+        return cls(file=name, sha256=sha256(points), points=points, remark="; ".join(filter(None, remarks)))
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
-        if self.sha256 != _sha256(self.points):
+        if self.sha256 != sha256(self.points):
             raise ValueError(f"{self.file}: the points are not those that their sha256 is of")
         polygons = self.polygons
         for number, polygon in enumerate(polygons, 1):
@@ -176,10 +174,6 @@ class Outline(Parameters):
             return [shapely.Polygon([[float(word) for word in line.split()] for line in block]) for block in blocks]
         except (ValueError, TypeError):
             raise ValueError(f"{self.file}: its points are not two numbers a line, three or more a body") from None
-
-    def __repr__(self) -> str:
-        """Tell what it is, without the points."""
-        return f"<{self}>"
 
     def __str__(self) -> str:
         """Name the file and tell what was found in it."""
@@ -210,10 +204,6 @@ def _corners(part: Any) -> list[Any]:
 def _shown(text: str) -> str:
     """Return what a terminal can be given."""
     return "".join(character if character.isprintable() else "?" for character in text)
-
-
-def _sha256(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _text(path: str | os.PathLike[str]) -> str:

@@ -43,8 +43,8 @@ class Volume:
     volume, frontal_area : float
         Its volume [D^d] and the area of its shadow along x [D^(d-1)].
     nearest : callable, optional
-        Takes points (n, d) and gives those of the surface that are nearest (n, d); by default found from the slope of
-        the distance.
+        Takes points (n, d) and gives their distances (n,) and the points of the surface that are nearest (n, d); by
+        default they are found from the slope of the distance.
     """
 
     distance: Callable[[FloatArray], FloatArray]
@@ -52,7 +52,7 @@ class Volume:
     upper: FloatArray
     volume: float
     frontal_area: float
-    nearest: Callable[[FloatArray], FloatArray] | None = None
+    nearest: Callable[[FloatArray], tuple[FloatArray, FloatArray]] | None = None
 
     @property
     def corners(self) -> tuple[FloatArray, FloatArray]:
@@ -76,20 +76,20 @@ class Volume:
         """Return how far points (n, d) lie outside of the body (n,), negative inside [D]."""
         return np.asarray(self.distance(points))
 
-    def slope(self, points: FloatArray) -> FloatArray:
-        """Return the gradient (n, d) of the height at points (n, d), the normal of the nearest piece of surface."""
+    def surface(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the heights (n,) of points (n, d) and their gradient (n, d), the normal of the surface nearest by."""
         if self.nearest is not None:
-            height, offset = self.height(points), points - self.nearest(points)
-            return offset / np.where(np.abs(height) < NEAR * self.size, np.inf, height)[:, None]
+            height, feet = self.nearest(points)
+            return height, (points - feet) / np.where(np.abs(height) < NEAR * self.size, np.inf, height)[:, None]
         step = 1e-4 * self.size
         sides = [
             self.height(points + step * axis) - self.height(points - step * axis) for axis in np.eye(len(self.lower))
         ]
-        return np.stack(sides, axis=1) / (2 * step)
+        return self.height(points), np.stack(sides, axis=1) / (2 * step)
 
     def feet(self, points: FloatArray) -> FloatArray:
         """Return the points (n, d) of the surface that are nearest to points (n, d)."""
-        return self.nearest(points) if self.nearest else self._at(points, np.zeros(len(points)))
+        return self.nearest(points)[1] if self.nearest else self._at(points, np.zeros(len(points)))
 
     def solid(self, spacing: float, layers: int) -> Solid:
         """Place solid particles on layers that follow the surface, at depths of 1/2, 3/2, ... spacings, evenly spaced.
@@ -102,7 +102,7 @@ class Volume:
         start, held = cells[near], (np.floor(height[near] / spacing) + 0.5) * spacing
         position = spread(start, start[:0], spacing, lambda points: self._at(points, held), self.flips)[held < 0]
         depth = -held[held < 0]
-        found, slope = self.height(position), self.slope(position)
+        found, slope = self.surface(position)
         steepness = np.linalg.norm(slope, axis=1)
         kept = (np.abs(found + depth) < SETTLED * spacing) & (steepness > STEEP)
         return Solid(position, slope / np.maximum(steepness, STEEP)[:, None], depth).where(kept)
@@ -134,19 +134,25 @@ class Volume:
     def _at(self, points: FloatArray, height: FloatArray) -> FloatArray:
         """Return the points (n, d) moved along the normal to heights (n,) over the surface."""
         for _ in range(2):
-            points = points + (height - self.height(points))[:, None] * self.slope(points)
+            found, slope = self.surface(points)
+            points = points + (height - found)[:, None] * slope
         return points
+
+
+def nose_up(angle: float) -> FloatArray:
+    """Return the matrix (3, 3) that turns vectors by an angle of attack [degrees] about z."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def cube(side: float, angle: float) -> Volume:
     """Return a cube about 0 (lengths in D), turned nose up by an angle of attack [degrees]."""
-    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    back = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    across = abs(c) + abs(s)
+    turned = nose_up(angle)
+    across = abs(turned[0, 0]) + abs(turned[0, 1])
     corner = 0.5 * side * np.array([across, across, 1.0])
 
     def distance(points: FloatArray) -> FloatArray:
-        beyond = np.abs(points @ back) - 0.5 * side
+        beyond = np.abs(points @ turned) - 0.5 * side
         return np.asarray(np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0))
 
     return Volume(distance, -corner, corner, side**3, side**2 * across)

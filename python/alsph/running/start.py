@@ -13,8 +13,7 @@ from alsph.engine.prescribed import difference
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.folder.checkpoint import Checkpoint
 from alsph.folder.run_folder import RunFolder
-from alsph.geometry.mesh import Mesh
-from alsph.geometry.outline import Outline
+from alsph.geometry.shape import Shape
 from alsph.results.run import Run
 from alsph.running import beginning
 from alsph.running.control import Control
@@ -40,7 +39,7 @@ def start(config: Config, path: Path, control: Control | None = None, *, force: 
         folder.truncate(0, 0.0, driver.outputs)
         for remark in remarks:
             folder.log(f"warning: {remark}")
-        if isinstance(outline := getattr(config.case, "shape", None), Outline | Mesh):
+        if isinstance(outline := getattr(config.case, "shape", None), Shape):
             folder.log(f"outline: {outline}")
         if config.run.initial_run is not None:
             folder.write_start(simulation.state(), config.case_tables())

@@ -20,7 +20,7 @@ from alsph.cases.remarks import keywords, tally
 from alsph.cases.source import shown_name
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder.durable import write_text
-from alsph.geometry.outline import Outline
+from alsph.geometry.shape import Shape
 from alsph.results.run import Run
 from alsph.study.declaration import text
 from alsph.tables import markdown
@@ -217,7 +217,7 @@ def _parameters(run: Run) -> dict[str, str]:
 def _parameter(value: Any) -> str:
     if value is None:
         return "automatic"
-    if isinstance(value, Outline):
+    if isinstance(value, Shape):
         return f"{value}{_sum(value.sha256)}"
     return text(value) if isinstance(value, int | float) else shown(value if isinstance(value, list) else str(value))
 

@@ -137,22 +137,7 @@ class Handler(BaseHTTPRequestHandler):
 
 
 def serve(path: str | Path, port: int | None = None) -> Server:
-    """Return a server of the page of a run that listens, but does not answer yet.
-
-    Parameters
-    ----------
-    path : path
-        The run folder.
-    port : int, optional
-        The port; the first one from 8000 on that is free, if None.
-
-    Raises
-    ------
-    RunFolderError
-        If it is no run folder.
-    ConfigError
-        If the port cannot be had.
-    """
+    """Return a server of the page of a run that listens, but does not answer yet (arguments as of `watch`)."""
     path = Path(path)
     if not path.is_dir():
         raise RunFolderError(f"{path}: no such run folder")
