@@ -18,6 +18,7 @@ pub mod kernel;
 pub mod loads;
 pub mod neighbours;
 pub mod particles;
+pub mod poisson;
 #[cfg(feature = "python")]
 mod python;
 pub mod report;

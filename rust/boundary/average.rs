@@ -1,7 +1,7 @@
 //! Shepard averages of the fluid around a particle, and what solid particles show of it: pressure (20), divergence, gradients.
 
 use crate::base::Vector;
-use crate::discretisation::Stencil;
+use crate::discretisation::{Gradient, Stencil};
 use crate::forcing::BodyForce;
 use crate::frame::Frame;
 use crate::halo::{Mirrored, Poison};
@@ -67,6 +67,23 @@ pub fn extrapolate_vector<const D: usize>(
     field: &mut [Vector<D>],
 ) {
     extrapolate(settings, frame, kind, field, |field, j, _| field[j].into(), Vector::<D>::from);
+}
+
+/// Renew the pressure of images and solids from that of the fluid. `gradient` is memory to be used.
+pub fn extend_pressure<const D: usize>(
+    settings: &Settings,
+    frame: &Frame<D>,
+    particles: &mut Particles<D>,
+    body_force: &BodyForce<D>,
+    gradient: &mut Vec<Vector<D>>,
+) {
+    frame.images.fill(&mut particles.pressure);
+    if settings.wall_pressure == WallPressure::Linear {
+        frame.images.blank(gradient, particles.len());
+        frame.stencil.evaluate_near_solids(Gradient(&particles.pressure), frame.images.real(gradient));
+        frame.images.fill(gradient);
+    }
+    extrapolate_pressure(settings, frame, particles, gradient, body_force);
 }
 
 /// The pressure of solid particles: the Shepard average of the fluid's, with the hydrostatic term (Adami, Hu and Adams 2012, eq. 27; bodies

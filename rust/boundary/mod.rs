@@ -2,12 +2,14 @@
 
 mod average;
 mod condition;
+mod flux;
 mod open;
 mod profile;
 mod solid;
 
-pub use average::{extrapolate_pressure, extrapolate_scalar, extrapolate_vector};
+pub use average::{extend_pressure, extrapolate_pressure, extrapolate_scalar, extrapolate_vector};
 pub use condition::{Condition, PressureRule, VelocityRule, conditions};
+pub use flux::add_wall_flux;
 pub use open::{MassFlow, end_step};
 pub use profile::surface_area;
 pub use solid::Walls;

@@ -8,6 +8,8 @@ mod stencil;
 
 pub use correction::Correction;
 pub use operator::{Neighbours, Nothing, Operator};
-pub use operators::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient, VelocityGradient};
+pub use operators::{
+    Divergence, Gradient, GradientAndLaplacian, Laplacian, LaplacianAndGradient, LaplacianDiagonal, VelocityGradient,
+};
 pub use printed::vector_laplacian;
 pub use stencil::{Corrected, Stencil};

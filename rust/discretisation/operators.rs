@@ -20,6 +20,12 @@ pub struct Divergence<'a, const D: usize>(pub &'a [Vector<D>]);
 /// ∇f of the first entry of a field of pairs and ∇²g of the second, the scalar form of (16).
 pub struct GradientAndLaplacian<'a>(pub &'a [[f64; 2]]);
 
+/// ∇²f, the scalar form of (16).
+pub struct Laplacian<'a>(pub &'a [f64]);
+
+/// What the value of the particle itself counts in [`Laplacian`]; negative.
+pub struct LaplacianDiagonal;
+
 /// ∇²u, component by component, and ∂u_k/∂x_l as the entry (k, l). In the Laplacian of particle i the solid neighbour s shows the
 /// velocity `seen(s, i)`.
 pub struct LaplacianAndGradient<'a, const D: usize, F> {
@@ -88,6 +94,52 @@ impl<const D: usize> Operator<D> for GradientAndLaplacian<'_> {
         std::array::from_fn(|lane| {
             let Correction { laplacian: factor, asymmetry, .. } = &corrections[lane];
             (gradient[lane], factor * (laplacian[lane] + asymmetry.dot(&linear[lane])))
+        })
+    }
+}
+
+impl<const D: usize> Operator<D> for Laplacian<'_> {
+    type Value = f64;
+
+    #[inline(always)]
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [f64; LANES] {
+        let here: V = near.cluster().lanes(|i| self.0[i]);
+        let (mut laplacian, mut linear) = (V::zero(), [V::zero(); D]);
+        near.for_each(
+            #[inline(always)]
+            |j, slope: V, r_ij| {
+                let difference = (V::splat(self.0[j]) - here) * slope;
+                laplacian += difference;
+                add_product(&mut linear, difference, r_ij);
+            },
+        );
+        let corrections = near.corrections();
+        let (laplacian, linear) = (laplacian.store(), vectors(linear));
+        std::array::from_fn(|lane| {
+            let Correction { laplacian: factor, asymmetry, .. } = &corrections[lane];
+            factor * (laplacian[lane] + asymmetry.dot(&linear[lane]))
+        })
+    }
+}
+
+impl<const D: usize> Operator<D> for LaplacianDiagonal {
+    type Value = f64;
+
+    #[inline(always)]
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [f64; LANES] {
+        let (mut sum, mut first) = (V::zero(), [V::zero(); D]);
+        near.for_each(
+            #[inline(always)]
+            |_, slope: V, r_ij| {
+                sum += slope;
+                add_product(&mut first, slope, r_ij);
+            },
+        );
+        let corrections = near.corrections();
+        let (sum, first) = (sum.store(), vectors(first));
+        std::array::from_fn(|lane| {
+            let Correction { laplacian: factor, asymmetry, .. } = &corrections[lane];
+            -factor * (sum[lane] + asymmetry.dot(&first[lane]))
         })
     }
 }

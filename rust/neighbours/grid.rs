@@ -1,8 +1,8 @@
-//! Cells at least half as wide as the search radius; points are listed by cell with a counting sort, those of a cell by their keys. So
-//! the order of neighbours, in which sums are formed, does not depend on how the points are stored.
+//! Cells at least half as wide as the search radius, with their points.
 
 use crate::base::Vector;
 use crate::base::parallel;
+use crate::neighbours::cells::Cells;
 use std::ops::Range;
 
 /// Cells that the search radius reaches to either side: narrow cells fit the sphere closer than wide ones.
@@ -18,11 +18,9 @@ pub struct Grid<const D: usize> {
     first: [usize; D],
     inverse_width: f64,
     cells: [usize; D],
-    /// First entry of `items` of each cell, and the end.
-    starts: Vec<u32>,
-    /// Point indices sorted by cell (first direction fastest), then by key, then by index.
-    items: Vec<u32>,
-    /// The coordinates of the points in the order of `items`, one array a direction.
+    /// Point indices by cell (first direction fastest).
+    listed: Cells,
+    /// The coordinates of the points in that order, one array a direction.
     coordinates: [Vec<f64>; D],
     cell_of: Vec<u32>,
 }
@@ -42,8 +40,7 @@ impl<const D: usize> Default for Grid<D> {
             first: [0; D],
             inverse_width: 1.0,
             cells: [1; D],
-            starts: vec![0, 0],
-            items: Vec::new(),
+            listed: Cells::default(),
             coordinates: std::array::from_fn(|_| Vec::new()),
             cell_of: Vec::new(),
         }
@@ -81,39 +78,24 @@ impl<const D: usize> Grid<D> {
         self.first = std::array::from_fn(|axis| first[axis] as usize);
         self.cells = std::array::from_fn(|axis| counts[axis] as usize);
         self.inverse_width = 1.0 / width;
-        self.counting_sort(points, keys);
+        self.sort(points, keys);
     }
 
-    fn counting_sort(&mut self, points: &[Vector<D>], keys: &[u64]) {
-        self.starts.clear();
-        self.starts.resize(self.cells.iter().product::<usize>() + 1, 0);
+    fn sort(&mut self, points: &[Vector<D>], keys: &[u64]) {
         let mut cell_of = std::mem::take(&mut self.cell_of);
         cell_of.resize(points.len(), 0);
         parallel::for_each(&mut cell_of, |i, cell| *cell = self.flat(self.cell(&points[i])) as u32);
-        cell_of.iter().for_each(|&cell| self.starts[cell as usize + 1] += 1);
-        for cell in 1..self.starts.len() {
-            self.starts[cell] += self.starts[cell - 1];
-        }
-        self.items.resize(points.len(), 0);
-        for (index, &cell) in cell_of.iter().enumerate() {
-            let slot = &mut self.starts[cell as usize];
-            self.items[*slot as usize] = index as u32;
-            *slot += 1;
-        }
-        // Each start has moved on to its end, which is the next cell's start.
-        self.starts.rotate_right(1);
-        self.starts[0] = 0;
-        sort_cells(&mut self.items, &self.starts, keys);
+        self.listed.sort(&cell_of, self.cells.iter().product(), keys);
         for (axis, coordinates) in self.coordinates.iter_mut().enumerate() {
             coordinates.resize(points.len(), 0.0);
-            parallel::for_each(coordinates, |k, x| *x = points[self.items[k] as usize][axis]);
+            parallel::for_each(coordinates, |k, x| *x = points[self.listed.items[k] as usize][axis]);
         }
         self.cell_of = cell_of;
     }
 
     /// Point indices sorted by cell, then by key, then by index.
     pub fn order(&self) -> &[u32] {
-        &self.items
+        &self.listed.items
     }
 
     /// Call `visit` with each run of points that may lie within the search radius of one of `points`, in a fixed order and
@@ -167,8 +149,11 @@ impl<const D: usize> Grid<D> {
     #[inline(always)]
     fn run(&self, row: [usize; D], [first, end]: [usize; 2]) -> Run<'_, D> {
         let start = self.flat(row);
-        let range = self.starts[start + first] as usize..self.starts[start + end] as usize;
-        Run { indices: &self.items[range.clone()], coordinates: self.coordinates.each_ref().map(|x| &x[range.clone()]) }
+        let range = self.listed.range(start + first, start + end);
+        Run {
+            indices: &self.listed.items[range.clone()],
+            coordinates: self.coordinates.each_ref().map(|x| &x[range.clone()]),
+        }
     }
 
     #[inline(always)]
@@ -183,24 +168,5 @@ impl<const D: usize> Grid<D> {
     #[inline(always)]
     fn flat(&self, cell: [usize; D]) -> usize {
         cell.iter().zip(&self.cells).rev().fold(0, |flat, (&c, &n)| flat * n + c)
-    }
-}
-
-/// Cells that are sorted one after the other.
-const CELLS: usize = 1024;
-
-/// Sort the items of each cell by their keys; those with the same one stay in order. `starts` are those of the cells, and the end.
-fn sort_cells(items: &mut [u32], starts: &[u32], keys: &[u64]) {
-    let cells = starts.len() - 1;
-    if cells > CELLS {
-        let (lower, upper) = items.split_at_mut((starts[cells / 2] - starts[0]) as usize);
-        rayon::join(|| sort_cells(lower, &starts[..=cells / 2], keys), || sort_cells(upper, &starts[cells / 2..], keys));
-        return;
-    }
-    for cell in starts.windows(2) {
-        let items = &mut items[(cell[0] - starts[0]) as usize..(cell[1] - starts[0]) as usize];
-        if !items.is_sorted_by_key(|&item| keys[item as usize]) {
-            items.sort_by_key(|&item| keys[item as usize]);
-        }
     }
 }

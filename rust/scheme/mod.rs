@@ -1,6 +1,7 @@
 //! Schemes: how velocity and pressure come from n to n+1.
 
 mod alsph;
+mod isph;
 mod projection;
 mod viscous;
 mod weakly_compressible;
@@ -12,6 +13,7 @@ use crate::particles::{ParticleKind, Particles};
 use crate::settings::{DensityDiffusion, SchemeSettings, Settings, TimeStepLimits};
 
 pub use alsph::{Alsph, Derived};
+pub use isph::Isph;
 pub use weakly_compressible::WeaklyCompressible;
 
 /// A scheme. What a step does beside it, from the search of neighbours to loads and shift, is the same for all.
@@ -38,6 +40,7 @@ pub trait Scheme<const D: usize>: Send + Sync {
 pub fn build<const D: usize>(settings: &Settings) -> Box<dyn Scheme<D>> {
     match settings.scheme {
         SchemeSettings::Alsph => Box::new(Alsph::new(settings)),
+        SchemeSettings::Isph(own) => Box::new(Isph::new(settings, own)),
         SchemeSettings::Wcsph { sound_speed, density_diffusion, diffusion_coefficient } => {
             Box::new(WeaklyCompressible::new(settings, sound_speed, density_diffusion, diffusion_coefficient))
         }

@@ -10,15 +10,15 @@
 //! smooth (after Antuono et al. 2010); κ = α h c₀/8 that of entropically damped artificial compressibility (EDAC; Ramachandran and Puri
 //! 2019). A step is one of Störmer and Verlet in its frame: half of p, all of u, the other half of p. The viscous term is that of u^n.
 
-use crate::base::Vector;
 use crate::base::parallel;
-use crate::boundary::{PressureRule, VelocityRule, conditions, extrapolate_pressure, extrapolate_vector};
-use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian, LaplacianAndGradient};
+use crate::base::{Matrix, Vector};
+use crate::boundary::{PressureRule, VelocityRule, conditions, extend_pressure, extrapolate_vector};
+use crate::discretisation::{Divergence, GradientAndLaplacian};
 use crate::flow::{Flow, Step};
 use crate::particles::{ParticleKind, Particles};
 use crate::scheme::Scheme;
-use crate::scheme::viscous::sharpen;
-use crate::settings::{DensityDiffusion, Eigenvalues, Settings, TimeStepLimits, WallPressure};
+use crate::scheme::viscous::Viscous;
+use crate::settings::{DensityDiffusion, Eigenvalues, Settings, TimeStepLimits};
 
 /// The fields of one step beside those of the particles, real particles and, where they have neighbours that read them, images.
 #[derive(Debug)]
@@ -28,10 +28,7 @@ pub struct WeaklyCompressible<const D: usize> {
     /// κ.
     diffusivity: f64,
     largest: Eigenvalues,
-    dispersion: f64,
-    /// ∇²u^n, and what takes it to fourth order.
-    laplacian: Vec<Vector<D>>,
-    sharper: Vec<Vector<D>>,
+    viscous: Viscous<D>,
     /// ∇·u, of u^n and then of u^{n+1}.
     divergence: Vec<f64>,
     /// p in the middle of the step, twice, because its gradient and Laplacian are taken together.
@@ -51,33 +48,12 @@ impl<const D: usize> WeaklyCompressible<D> {
             density_diffusion,
             diffusivity: coefficient * settings.smoothing_length() * sound_speed,
             largest: settings.largest_eigenvalues(),
-            dispersion: settings.laplacian_dispersion() * settings.particle_spacing.powi(2),
-            laplacian: Vec::new(),
-            sharper: Vec::new(),
+            viscous: Viscous::new(settings),
             divergence: Vec::new(),
             pressure: Vec::new(),
             gradient: Vec::new(),
             diffusing: Vec::new(),
             near_walls: Vec::new(),
-        }
-    }
-
-    /// ∇²u^n and ∇·u^n: the first pass over a frame, so it forms the corrections too.
-    fn velocity_derivatives(&mut self, step: Step, flow: &mut Flow<D>) {
-        let Flow { particles, frame, walls, .. } = &mut *flow;
-        walls.see(step.settings, particles, frame);
-        let walls = &*walls;
-        frame.images.blank(&mut self.laplacian, particles.real);
-        frame.images.blank(&mut self.divergence, particles.real);
-        frame.stencil.correct_and_for_each(
-            LaplacianAndGradient { velocity: &particles.velocity, seen: |s, i| walls.seen_by(particles, s, i) },
-            &mut self.laplacian,
-            &mut self.divergence,
-            |_, (value, gradient), laplacian, divergence| (*laplacian, *divergence) = (value, gradient.trace()),
-        );
-        self.sharper.clear();
-        if step.settings.viscous_order == 4 {
-            sharpen(step, flow, |i| self.laplacian[i], self.dispersion, &mut self.sharper);
         }
     }
 
@@ -93,17 +69,9 @@ impl<const D: usize> WeaklyCompressible<D> {
         });
     }
 
-    /// The pressure that solids show.
-    fn extrapolate_wall_pressure(&mut self, settings: &Settings, flow: &mut Flow<D>) {
-        let Flow { particles, frame, body_force, .. } = flow;
-        frame.images.fill(&mut particles.pressure);
-        if settings.wall_pressure == WallPressure::Linear {
-            let gradient = &mut self.near_walls;
-            frame.images.blank(gradient, particles.len());
-            frame.stencil.evaluate_near_solids(Gradient(&particles.pressure), frame.images.real(gradient));
-            frame.images.fill(gradient);
-        }
-        extrapolate_pressure(settings, frame, particles, &self.near_walls, body_force);
+    /// The pressure that images and solids show.
+    fn extend_pressure(&mut self, settings: &Settings, Flow { particles, frame, body_force, .. }: &mut Flow<D>) {
+        extend_pressure(settings, frame, particles, body_force, &mut self.near_walls);
     }
 
     /// u^{n+1} by the pressure in the middle of the step. Buffers and solids keep their velocities.
@@ -119,11 +87,10 @@ impl<const D: usize> WeaklyCompressible<D> {
             &mut self.diffusing,
             |_, values, gradient, laplacian| (*gradient, *laplacian) = values,
         );
-        let sharper = |i: usize| self.sharper.get(i).copied().unwrap_or_else(Vector::zeros);
         let (kind, position, condition) = (&particles.kind, &particles.position, conditions(settings));
         parallel::for_each(frame.images.real(&mut particles.velocity), |i, u| {
             if condition(kind[i], &position[i]).velocity == VelocityRule::Solved {
-                let viscous = (self.laplacian[i] + sharper(i)) * settings.kinematic_viscosity;
+                let viscous = self.viscous.laplacian(i) * settings.kinematic_viscosity;
                 *u += (viscous - self.gradient[i] / settings.density + body_force.at(i)) * step.time_step;
             }
         });
@@ -156,15 +123,15 @@ impl<const D: usize> Scheme<D> for WeaklyCompressible<D> {
     }
 
     fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> usize {
-        self.velocity_derivatives(step, flow);
+        self.viscous.begin(step, flow, &mut self.divergence, Matrix::trace);
         self.advance_pressure(step, flow);
-        self.extrapolate_wall_pressure(step.settings, flow);
+        self.extend_pressure(step.settings, flow);
         self.advance_velocity(step, flow);
         let velocity = &flow.particles.velocity;
         flow.frame.stencil.for_each_one(Divergence(velocity), &mut self.divergence, |_, value, out| *out = value);
         self.advance_pressure(step, flow);
         self.diffuse_pressure(step, flow);
-        self.extrapolate_wall_pressure(step.settings, flow);
+        self.extend_pressure(step.settings, flow);
         flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
         1
     }

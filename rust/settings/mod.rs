@@ -14,8 +14,8 @@ pub use domain::{Body, Boundary, Domain};
 pub use lattice::Eigenvalues;
 pub use limits::TimeStepLimits;
 pub use rules::{
-    DensityDiffusion, DerivativeFrame, SchemeSettings, Shifting, SweepPressure, SweepWeights, VelocityLaplacian,
-    WallPressure, WallVelocity,
+    DensityDiffusion, DerivativeFrame, ProjectionSettings, SchemeSettings, Shifting, Solver, SweepPressure, SweepWeights,
+    VelocityLaplacian, WallPressure, WallVelocity,
 };
 
 /// Iterations or sweeps of a step above which a number is a mistake: a step cannot be interrupted.
@@ -176,16 +176,22 @@ impl Settings {
     }
 
     fn validate_scheme(&self) -> Result<()> {
-        let (sound_speed, coefficient) = match self.scheme {
+        match self.scheme {
             SchemeSettings::Alsph => return Ok(()),
+            SchemeSettings::Isph(own) => own.validate()?,
             SchemeSettings::Wcsph { sound_speed, diffusion_coefficient, .. }
-            | SchemeSettings::Edac { sound_speed, diffusion_coefficient } => (sound_speed, diffusion_coefficient),
-        };
-        if !(sound_speed.is_finite() && sound_speed > 0.0) {
-            return Err(setting("scheme.sound_speed", format!("must be a positive number, not {sound_speed}")));
+            | SchemeSettings::Edac { sound_speed, diffusion_coefficient } => {
+                if !(sound_speed.is_finite() && sound_speed > 0.0) {
+                    return Err(setting("scheme.sound_speed", format!("must be a positive number, not {sound_speed}")));
+                }
+                if !(0.0..=1.0).contains(&diffusion_coefficient) {
+                    let problem = format!("must lie in 0..1, not {diffusion_coefficient}");
+                    return Err(setting("scheme.diffusion_coefficient", problem));
+                }
+            }
         }
-        if !(0.0..=1.0).contains(&coefficient) {
-            return Err(setting("scheme.diffusion_coefficient", format!("must lie in 0..1, not {coefficient}")));
+        if self.derivative_frame == DerivativeFrame::Updated {
+            return Err(setting("derivative_frame", "must be \"initial\" or \"midpoint\" but in the scheme alsph"));
         }
         if self.velocity_laplacian == VelocityLaplacian::Vector {
             return Err(setting("velocity_laplacian", "must be \"scalar\" but in the scheme alsph"));

@@ -1,6 +1,8 @@
 //! The choices of a method.
 
+use super::MOST_PASSES;
 use crate::base::Matrix;
+use crate::base::error::{Result, setting};
 use serde::{Deserialize, Serialize};
 
 /// How velocity and pressure come from one step to the next, with the parameters that are the scheme's own.
@@ -10,6 +12,8 @@ pub enum SchemeSettings {
     /// Augmented Lagrangian SPH.
     #[default]
     Alsph,
+    /// Projection ISPH.
+    Isph(ProjectionSettings),
     /// Weakly compressible SPH.
     Wcsph {
         /// c₀.
@@ -31,10 +35,49 @@ impl SchemeSettings {
     /// c₀ of a weakly compressible scheme.
     pub fn sound_speed(&self) -> Option<f64> {
         match *self {
-            Self::Alsph => None,
+            Self::Alsph | Self::Isph(_) => None,
             Self::Wcsph { sound_speed, .. } | Self::Edac { sound_speed, .. } => Some(sound_speed),
         }
     }
+}
+
+/// What projection ISPH has of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProjectionSettings {
+    /// β: how much of the old pressure the predicted velocity has felt.
+    pub pressure_share: f64,
+    pub solver: Solver,
+    /// Largest ‖f + ∇²x‖ / ‖f‖ that a solve ends with.
+    pub tolerance: f64,
+    pub max_solver_iterations: usize,
+}
+
+impl ProjectionSettings {
+    pub(super) fn validate(&self) -> Result<()> {
+        for (name, value, lowest, highest) in [
+            ("scheme.pressure_share", self.pressure_share, 0.0, 1.0),
+            ("scheme.tolerance", self.tolerance, 0.0, 1.0),
+            ("scheme.max_solver_iterations", self.max_solver_iterations as f64, 1.0, MOST_PASSES),
+        ] {
+            if !(lowest..=highest).contains(&value) {
+                return Err(setting(name, format!("must lie in {lowest}..{highest}, not {value}")));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// How the Poisson equation of the pressure is solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Solver {
+    /// Cycles of multigrid on a background grid, each with a few steps of Chebyshev's iteration.
+    Multigrid,
+    /// BiCGSTAB preconditioned by them.
+    Bicgstab,
+    /// Damped Jacobi iteration.
+    Jacobi,
 }
 
 /// Diffusion of the density in weakly compressible SPH.

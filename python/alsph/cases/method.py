@@ -70,9 +70,9 @@ class Method(Parameters):
     in_space: ClassVar[int] = 2
     """Number of space dimensions of a case without a parameter for it."""
 
-    scheme: Literal["alsph", "wcsph", "edac"] | None = Field(
+    scheme: Literal["alsph", "isph", "wcsph", "edac"] | None = Field(
         default=None,
-        description="augmented Lagrangian SPH, weakly compressible SPH, or entropically damped artificial "
+        description="augmented Lagrangian SPH, projection ISPH, weakly compressible SPH, or entropically damped artificial "
         "compressibility; alsph if not given",
     )
     sound_speed: float | None = Field(
@@ -86,6 +86,23 @@ class Method(Parameters):
         ge=0,
         le=1,
         description="δ of wcsph, 0.1 if not given, or α of edac, 0.5 if not given [-]",
+    )
+    solver: Literal["bicgstab", "multigrid", "jacobi"] | None = Field(
+        default=None,
+        description="how isph solves the Poisson equation of the pressure, bicgstab if not given",
+    )
+    solver_tolerance: float | None = Field(
+        default=None, ge=0, lt=1, description="relative residual that a solve of isph ends with, 1e-3 if not given [-]"
+    )
+    solver_iterations: int | None = Field(
+        default=None, ge=1, le=1000, description="cap of the iterations of a solve of isph, 200 if not given [-]"
+    )
+    pressure_share: float | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="how much of the old pressure isph's predicted velocity has felt, 0.9 if not given; "
+        "0: the pressure is solved anew in every step [-]",
     )
     courant: float | None = Field(
         default=None,
@@ -201,7 +218,7 @@ class Method(Parameters):
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")
             return values
-        if values.get("scheme") in tuple(DIFFUSION):  # it may be anything
+        if values.get("scheme") in ("isph", *DIFFUSION):  # it may be anything
             return values if values.get("time_step") is not None else values | {"courant": COURANT}
         if not _as_in_the_paper(values):
             return values | {"courant": COURANT}
@@ -211,13 +228,17 @@ class Method(Parameters):
     @classmethod
     def _what_belongs_to_the_scheme(cls, values: dict[str, Any]) -> dict[str, Any]:
         scheme = values.get("scheme") or "alsph"
-        if scheme not in ("alsph", *DIFFUSION):
+        if scheme not in ("alsph", "isph", *DIFFUSION):
             return values  # its own check refuses it
         own = {
             "sound_speed": ("wcsph", "edac"),
             "diffusion_coefficient": ("wcsph", "edac"),
             "density_diffusion": ("wcsph",),
             "penalty_constant": ("alsph",),
+            "solver": ("isph",),
+            "solver_tolerance": ("isph",),
+            "solver_iterations": ("isph",),
+            "pressure_share": ("isph",),
         }
         for name, schemes in own.items():
             if values.get(name) is not None and scheme not in schemes:
@@ -237,6 +258,14 @@ class Method(Parameters):
 
     def _scheme_settings(self) -> dict[str, Any]:
         """Return the engine's settings of the scheme alone."""
+        if self.scheme == "isph":
+            return {
+                "kind": "isph",
+                "pressure_share": 0.9 if self.pressure_share is None else self.pressure_share,
+                "solver": self.solver or "bicgstab",
+                "tolerance": 1e-3 if self.solver_tolerance is None else self.solver_tolerance,
+                "max_solver_iterations": self.solver_iterations or 200,
+            }
         if not self.is_weakly_compressible:
             return {"kind": "alsph"}
         given = self.diffusion_coefficient

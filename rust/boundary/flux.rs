@@ -1,0 +1,60 @@
+//! The flux into a wall, all of it.
+//!
+//! ∇·u of the fluid with solids that show the wall's velocity sees the jump of the normal velocity at the surface, smeared over the support:
+//! half of it on fluid particles, half on solid ones, which have no equations. A Poisson equation whose right-hand side lacks that half makes
+//! half of the pressure gradient that would stop the fluid at the wall. So each solid hands what it sees to the fluid around.
+
+use crate::base::{Vector, parallel};
+use crate::boundary::average::for_each_weighted;
+use crate::frame::Frame;
+use crate::particles::{ParticleKind, Particles};
+use crate::settings::Settings;
+use rayon::prelude::*;
+
+/// Add to `divergence`, that of `velocity` at the real particles, what solid particles see of it: each gives the integral over its volume to
+/// the flowing particles around, in proportion to the kernel. `handed` is memory to be used.
+pub fn add_wall_flux<const D: usize>(
+    settings: &Settings,
+    particles: &Particles<D>,
+    frame: &Frame<D>,
+    velocity: &[Vector<D>],
+    handed: &mut Vec<f64>,
+    divergence: &mut [f64],
+) {
+    let stencil = &frame.stencil;
+    let is_solid = |i: &usize| particles.kind[*i] == ParticleKind::Solid;
+    let share = |s: usize| {
+        let (row, lane) = stencil.neighbours.row(s);
+        let (mut total, mut mean) = (0.0, Vector::zeros());
+        for_each_weighted(settings, stencil, s, row.flowing_seen(lane), |j, weight, _| {
+            total += weight;
+            mean += velocity[j] * weight;
+        });
+        if total == 0.0 {
+            return 0.0;
+        }
+        // Along the wall the fluid slides: there its own mean is what others differ from, else a corner's cut support would count as a flux.
+        mean /= total;
+        let normal = &particles.normal[s];
+        let wall = mean + normal * (velocity[s] - mean).dot(normal);
+        let flux = |j: usize| (velocity[j] - wall).dot(&(stencil.position[s] - stencil.position[j]));
+        let flux = row.flowing().iter().map(|entry| flux(entry.j()) * entry.slope(lane)).sum::<f64>();
+        stencil.volume[s] * flux / total
+    };
+    let shares: Vec<_> = (0..particles.real).into_par_iter().filter(is_solid).map(|s| (s, share(s))).collect();
+    if shares.is_empty() {
+        return;
+    }
+    frame.images.blank(handed, particles.len());
+    shares.into_iter().for_each(|(s, share)| handed[s] = share);
+    frame.images.fill(handed);
+    let handed = &*handed;
+    parallel::for_each(divergence, |i, divergence| {
+        if particles.kind[i] != ParticleKind::Solid {
+            let (row, lane) = stencil.neighbours.row(i);
+            let mut sum = 0.0;
+            for_each_weighted(settings, stencil, i, row.solid_seen(lane), |s, weight, _| sum += weight * handed[s]);
+            *divergence += sum / stencil.volume[i];
+        }
+    });
+}

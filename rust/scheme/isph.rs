@@ -1,0 +1,185 @@
+//! Projection ISPH: a pressure from its Poisson equation makes the predicted velocity free of divergence.
+//!
+//! ```text
+//! u* = u^n + Δt (ν ∇²u^n + g − β ∇p^n/ρ),    ∇²q = ρ/Δt (∇·u* − θ),    p^{n+1} = β p^n + q,    u^{n+1} = u* − Δt/ρ ∇q
+//! ```
+//!
+//! with the compact Laplacian, so that a divergence of the order Δx² stays (an approximate projection). β = 0 solves the pressure anew (Cummins and
+//! Rudman 1999; Shadloo et al. 2011), β = 1 its change. θ is [`DerivativeFrame::solenoidal_divergence`]. Solids show q with ∂q/∂n = 0
+//! to the Laplacian, and the fluid has their share of the flux into walls ([`add_wall_flux`]); to the gradient they show the pressure of the
+//! rule for walls.
+//!
+//! [`DerivativeFrame::solenoidal_divergence`]: crate::settings::DerivativeFrame::solenoidal_divergence
+
+use crate::base::{Matrix, Vector, parallel};
+use crate::boundary::{PressureRule, VelocityRule, add_wall_flux, conditions, extend_pressure};
+use crate::discretisation::{Divergence, Gradient};
+use crate::flow::{Flow, Step};
+use crate::particles::Particles;
+use crate::poisson::{Goal, Poisson, System};
+use crate::scheme::Scheme;
+use crate::scheme::projection::{Projection, Sweeps};
+use crate::scheme::viscous::Viscous;
+use crate::settings::{Eigenvalues, ProjectionSettings, Settings, TimeStepLimits};
+use crate::shifting::measures_divergence;
+
+/// The fields of one step beside those of the particles, real particles and, where they have neighbours that read them, images.
+#[derive(Debug)]
+pub struct Isph<const D: usize> {
+    own: ProjectionSettings,
+    largest: Eigenvalues,
+    sweeps: Sweeps,
+    viscous: Viscous<D>,
+    /// θ.
+    solenoidal: Vec<f64>,
+    /// u*.
+    velocity_star: Vec<Vector<D>>,
+    /// ∇·u*, then the right-hand side.
+    source: Vec<f64>,
+    handed: Vec<f64>,
+    /// β p^n as the gradient saw it.
+    base: Vec<f64>,
+    /// q.
+    change: Vec<f64>,
+    /// ∇p near solids, where the pressure is continued into them.
+    near_walls: Vec<Vector<D>>,
+    divergence: Vec<f64>,
+    poisson: Poisson<D>,
+    projection: Projection,
+}
+
+impl<const D: usize> Isph<D> {
+    pub fn new(settings: &Settings, own: ProjectionSettings) -> Self {
+        let largest = settings.largest_eigenvalues();
+        Self {
+            own,
+            largest,
+            sweeps: Sweeps::new(settings, largest),
+            viscous: Viscous::new(settings),
+            solenoidal: Vec::new(),
+            velocity_star: Vec::new(),
+            source: Vec::new(),
+            handed: Vec::new(),
+            base: Vec::new(),
+            change: Vec::new(),
+            near_walls: Vec::new(),
+            divergence: Vec::new(),
+            poisson: Poisson::default(),
+            projection: Projection::default(),
+        }
+    }
+
+    /// The pressure that images and solids show.
+    fn extend_pressure(&mut self, settings: &Settings, Flow { particles, frame, body_force, .. }: &mut Flow<D>) {
+        extend_pressure(settings, frame, particles, body_force, &mut self.near_walls);
+    }
+
+    /// u*. Buffers and solids keep their velocities.
+    fn predict_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
+        let share = self.own.pressure_share;
+        self.extend_pressure(step.settings, flow);
+        let Flow { particles, frame, body_force, .. } = flow;
+        frame.images.blank(&mut self.base, particles.len());
+        self.base.copy_from_slice(&particles.pressure);
+        parallel::for_each(&mut self.base, |_, p| *p *= share);
+        frame.images.blank(&mut self.velocity_star, particles.len());
+        let (velocity, viscous) = (&particles.velocity, &self.viscous);
+        let condition = conditions(step.settings);
+        let star = |i: usize, gradient: Vector<D>| match condition(particles.kind[i], &particles.position[i]).velocity {
+            VelocityRule::Kept => velocity[i],
+            VelocityRule::Solved => {
+                let viscous = viscous.laplacian(i) * step.settings.kinematic_viscosity;
+                velocity[i] + (viscous + body_force.at(i) - gradient / step.settings.density) * step.time_step
+            }
+        };
+        let out = frame.images.real(&mut self.velocity_star);
+        if share > 0.0 {
+            frame.stencil.for_each_one(Gradient(&self.base), out, |i, gradient, out| *out = star(i, gradient));
+        } else {
+            parallel::for_each(out, |i, out| *out = star(i, Vector::zeros()));
+        }
+        frame.images.fill(&mut self.velocity_star);
+    }
+
+    /// −ρ/Δt (∇·u* − θ), as the equation of each particle has it.
+    fn form_source(&mut self, step: Step, Flow { particles, frame, .. }: &Flow<D>) {
+        frame.images.blank(&mut self.source, particles.real);
+        let star = &self.velocity_star;
+        frame.stencil.for_each_one(Divergence(star), &mut self.source, |_, divergence, out| *out = divergence);
+        add_wall_flux(step.settings, particles, frame, star, &mut self.handed, &mut self.source);
+        let (condition, factor) = (conditions(step.settings), step.settings.density / step.time_step);
+        parallel::for_each(&mut self.source, |i, source| {
+            *source = match condition(particles.kind[i], &particles.position[i]).pressure {
+                PressureRule::Solved => -factor * (*source - self.solenoidal[i]),
+                _ => 0.0,
+            };
+        });
+    }
+
+    /// p^{n+1} and u^{n+1}.
+    fn correct_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
+        let Flow { particles, frame, .. } = &mut *flow;
+        parallel::for_each(frame.images.real(&mut particles.pressure), |i, p| *p = self.base[i] + self.change[i]);
+        self.extend_pressure(step.settings, flow);
+        let Flow { particles, frame, .. } = flow;
+        parallel::for_each(&mut self.change, |i, change| *change = particles.pressure[i] - self.base[i]);
+        let Particles { kind, position, velocity, .. } = particles;
+        let (star, factor, condition) =
+            (&self.velocity_star, step.time_step / step.settings.density, conditions(step.settings));
+        frame.stencil.for_each_one(Gradient(&self.change), frame.images.real(velocity), |i, gradient, u| {
+            if condition(kind[i], &position[i]).velocity == VelocityRule::Solved {
+                *u = star[i] - gradient * factor;
+            }
+        });
+        frame.images.fill(velocity);
+    }
+}
+
+impl<const D: usize> Scheme<D> for Isph<D> {
+    fn limits(&self, settings: &Settings, velocity_max: f64) -> TimeStepLimits {
+        settings.time_step_limits(velocity_max, self.largest)
+    }
+
+    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> usize {
+        self.projection.begin();
+        let (frame, time_step) = (step.settings.derivative_frame, step.time_step);
+        let solenoidal = |gradient: &Matrix<D>| frame.solenoidal_divergence(gradient, time_step);
+        self.viscous.begin(step, flow, &mut self.solenoidal, solenoidal);
+        self.predict_velocity(step, flow);
+        self.form_source(step, flow);
+        let Flow { particles, frame, .. } = &mut *flow;
+        let share = self.own.pressure_share;
+        frame.images.blank(&mut self.change, particles.len());
+        parallel::for_each(frame.images.real(&mut self.change), |i, change| *change = (1.0 - share) * particles.pressure[i]);
+        self.poisson.begin(step.settings, particles, frame, self.own.solver);
+        let system = System { settings: step.settings, particles, frame, largest: self.largest };
+        let goal = Goal { tolerance: self.own.tolerance, max_iterations: self.own.max_solver_iterations };
+        let solution = self.poisson.solve(system, self.own.solver, goal, &mut self.source, &mut self.change);
+        self.correct_velocity(step, flow);
+        let solenoidal = &self.solenoidal;
+        if step.settings.projection_sweeps > 0 {
+            self.projection.sweep(step, self.sweeps, flow, |i| solenoidal[i]);
+        }
+        if !measures_divergence(step.settings) {
+            let Flow { particles, frame, .. } = &*flow;
+            frame.images.blank(&mut self.divergence, particles.real);
+            frame.stencil.for_each_one(Divergence(&particles.velocity), &mut self.divergence, |i, value, out| {
+                *out = value - solenoidal[i];
+            });
+        }
+        flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
+        solution.iterations
+    }
+
+    fn divergence(&self, i: usize) -> f64 {
+        self.divergence[i]
+    }
+
+    fn acting_pressure(&self, _: Step, particles: &Particles<D>, i: usize) -> f64 {
+        particles.pressure[i] + self.projection.unkept(particles, i)
+    }
+
+    fn penalty(&self, _: f64) -> f64 {
+        f64::NAN
+    }
+}
