@@ -14,6 +14,7 @@ import tomli_w
 from pydantic import Field, field_validator
 
 from alsph import cases
+from alsph.analysis.planes import grids
 from alsph.analysis.probes import points
 from alsph.arrays import FloatArray
 from alsph.errors import ConfigError, RunFolderError
@@ -67,6 +68,24 @@ class RunSettings(Parameters):
     probe_interval: float | None = Field(
         default=None, gt=0, description="time between two records of the probes, 0.05 if not given [D/U]"
     )
+    planes: str | list[str] | None = Field(
+        default=None,
+        description="planes, in 2-D lines and regions, where velocity and pressure are recorded: an axis and its place "
+        "or two corners, and the distance of points if it is not Δx: 'x=3; z=0.5:0.1; X,Y,Z:X,Y,Z' [D]",
+    )
+
+    @field_validator("planes", mode="before")
+    @classmethod
+    def _joined(cls, planes: Any) -> Any:
+        if planes is None or isinstance(planes, str):
+            return planes
+        if not (isinstance(planes, list | tuple) and all(isinstance(plane, str) for plane in planes)):
+            raise ValueError("must be a text such as 'x=3; 1,-1:4,1', or a list of such")
+        return "; ".join(planes)
+
+    plane_interval: float | None = Field(
+        default=None, gt=0, description="time between two records of the planes, 0.5 if not given [D/U]"
+    )
     checkpoint_minutes: float = Field(default=10.0, gt=0, description="longest time between two checkpoints [min]")
     flush_seconds: float = Field(
         default=2.0, gt=0, description="longest time that rows of the history stay unwritten [s]"
@@ -114,6 +133,20 @@ class Config:
             raise ConfigError(f"run.probes: {point.tolist()} lies outside of the domain, {box}")
         return found
 
+    @property
+    def planes(self) -> list[tuple[FloatArray, ...]]:
+        """Coordinates along x, y and, in 3-D, z of the points of each plane [D].
+
+        Raises
+        ------
+        ConfigError
+            If one is no plane of the domain, or they have too many points.
+        """
+        case = self.case
+        if not self.run.planes:
+            return []
+        return grids(self.run.planes, case.checked_domain, case.particle_spacing, case.middle)
+
     def tables(self) -> dict[str, Any]:
         """Return the content of the configuration file; what is not set is left out."""
         return self.case_tables() | {"run": self.run.model_dump(exclude_none=True) | {"until": self.until}}
@@ -129,7 +162,7 @@ class Config:
         return of_the_flow(self.case_tables())
 
     def check(self) -> None:
-        """Refuse parameters that a file cannot give back, and probes outside of the domain.
+        """Refuse parameters that a file cannot give back, and probes and planes outside of the domain.
 
         Raises
         ------
@@ -149,7 +182,7 @@ class Config:
             odd = [name for name, value in values.items() if not isinstance(value, KEPT)] or list(table)
             told = f"{odd[0]} = {shown(values[odd[0]])}: a parameter of {kind.__name__} that its file cannot give back"
             raise ConfigError(f"{told}; use numbers, texts, true or false, and lists of them")
-        _ = self.probes
+        _ = self.probes, self.planes
 
     def text(self) -> str:
         """Return the configuration with all its parameters as TOML."""

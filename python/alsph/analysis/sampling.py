@@ -47,10 +47,12 @@ def fill(position: FloatArray, points: FloatArray, spacing: float) -> FloatArray
     return np.asarray(spacing ** points.shape[1] * kernel.sum(axis=1))
 
 
-def in_solid(snapshot: Snapshot, points: FloatArray) -> NDArray[np.bool_]:
+def in_solid(position: FloatArray, fluid: NDArray[np.bool_], points: FloatArray) -> NDArray[np.bool_]:
     """Whether points (m, d) lie in a body: nearer to one of its particles than to any of the fluid."""
-    _, nearest = neighbour_tree(snapshot.position).query(points)
-    return np.asarray(~snapshot.fluid[nearest])
+    if fluid.all():
+        return np.zeros(len(points), bool)
+    _, nearest = neighbour_tree(position).query(points)
+    return np.asarray(~fluid[nearest])
 
 
 def at(snapshot: Snapshot, points: FloatArray, spacing: float, domain: Domain) -> dict[str, FloatArray]:

@@ -246,7 +246,7 @@ def surface(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def probes(path: Path, dimensions: int) -> Probes:
-    """Read ``probes.h5``; all arrays are empty if there is no file."""
+    """Read ``probes.h5`` or ``planes.h5``; all arrays are empty if there is no file."""
     if not path.exists():
         empty = np.empty((0, dimensions))
         return Probes(empty, np.empty(0), empty[None][:0], np.empty((0, 0)))

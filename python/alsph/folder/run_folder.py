@@ -45,7 +45,7 @@ START = "start.h5"
 MARKS = ("case.toml", "run.json")
 """What tells that a folder is a run folder."""
 OWN = re.compile(
-    r"\.?(case\.toml|run\.json|run\.log|\.?lock|(checkpoint(\.previous)?|history|particles|surface|probes|start|breakdown|flow)(\.damaged\d*)?"
+    r"\.?(case\.toml|run\.json|run\.log|\.?lock|(checkpoint(\.previous)?|history|particles|surface|probes|planes|start|breakdown|flow)(\.damaged\d*)?"
     r"\.(h5|csv|vtkhdf|nc))(\.new|\.journal)?"
     r"|(ledger|((forces|spectrum|pressure_coefficient)(_of_\w+)?)|pressure|vorticity|velocity(_divergence|_at_tu_d_\w+)?|kinetic_energy"
     r"|[uv]_at_[xy]_d_2)\.(png|pdf|svg|gif|mp4|webm)"

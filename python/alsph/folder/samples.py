@@ -1,16 +1,25 @@
-"""Files of what is sampled at fixed points over time, ``surface.h5`` and ``probes.h5``: see docs/architecture.md."""
+"""Files of what is sampled at fixed points over time, ``surface.h5``, ``probes.h5`` and ``planes.h5``.
 
+See docs/architecture.md.
+"""
+
+import math
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alsph.arrays import FloatArray
 from alsph.folder.durable import growing
 from alsph.folder.reading import sound
 
+CHUNK = 2**17
+"""Most numbers of a chunk of an array in a file, if a record is not larger by itself."""
 
-def append(path: Path, time: FloatArray, points: Mapping[str, FloatArray], values: Mapping[str, FloatArray]) -> None:
+
+def append(path: Path, time: FloatArray, points: Mapping[str, NDArray[Any]], values: Mapping[str, FloatArray]) -> None:
     """Append samples at times (k,).
 
     Parameters
@@ -37,7 +46,8 @@ def append(path: Path, time: FloatArray, points: Mapping[str, FloatArray], value
                 file[own] = array
             for own, samples in values.items():
                 shape = samples.shape[1:]
-                file.create_dataset(own, (0, *shape), float, maxshape=(None, *shape), chunks=(64, *shape))
+                chunks = (max(1, min(64, CHUNK // max(1, math.prod(shape)))), *shape)
+                file.create_dataset(own, (0, *shape), float, maxshape=(None, *shape), chunks=chunks)
             file.create_dataset("time", (0,), float, maxshape=(None,), chunks=(64,))
         elif file[name].shape != where.shape or not np.allclose(file[name], where, rtol=0, atol=1e-9):
             raise ValueError("it holds samples at other points")

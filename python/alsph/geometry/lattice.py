@@ -25,6 +25,20 @@ def cell_centres(count: int, spacing: float) -> FloatArray:
     return spacing * (np.arange(count, dtype=np.float64) + 0.5)
 
 
+def cell_counts(lower: FloatArray, upper: FloatArray, spacing: float) -> FloatArray:
+    """Return how many cells (d,) of about a size cover a box from corner to corner, at least one along each axis."""
+    with np.errstate(over="ignore"):  # which is more than anyone has room for
+        return np.clip(np.round((upper - lower) / spacing), 1.0, 1e15)
+
+
+def cell_middles(lower: FloatArray, upper: FloatArray, counts: FloatArray) -> tuple[FloatArray, ...]:
+    """Return the middles, along each axis, of the cells that a box from corner to corner is cut into."""
+    return tuple(
+        low + (np.arange(int(count)) + 0.5) * (high - low) / count
+        for low, high, count in zip(lower, upper, counts, strict=True)
+    )
+
+
 def symmetric_centres(count: int, spacing: float) -> FloatArray:
     """Return the centres of `count` cells about 0, each exactly the negative of its mirror image."""
     return spacing * (np.arange(count, dtype=np.float64) - 0.5 * (count - 1))

@@ -14,7 +14,7 @@ from alsph.text import shown
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane that is normal to an axis.
+    """A plane, in 2-D a line, that is normal to an axis.
 
     Attributes
     ----------
@@ -28,8 +28,10 @@ class Plane:
     place: float
 
     @classmethod
-    def of(cls, given: str | None, middle: FloatArray) -> Plane:
-        """Return the plane of a text such as ``z=0.5``; ``y`` alone, or ``z`` if None, through the point `middle` (3,).
+    def of(cls, given: str | None, middle: FloatArray, setting: str = "plane") -> Plane:
+        """Return the plane of a text such as ``z=0.5``; ``y`` alone, or ``z`` if None, through the point `middle` (d,).
+
+        In 2-D it is a line. `setting` is what the text is called in the message.
 
         Raises
         ------
@@ -38,12 +40,15 @@ class Plane:
         """
         name, equals, number = str("z" if given is None else given).replace(" ", "").partition("=")
         try:
-            axis = AXES.index(name or "?")
+            axis = AXES[: len(middle)].index(name or "?")
             place = float(number) if equals else float(middle[axis])
         except ValueError:
             place = np.nan
         if not np.isfinite(place):
-            raise ConfigError(f"plane = {shown(given)}: must be an axis and where the plane cuts it, as in z=0.5 [D]")
+            last = AXES[len(middle) - 1]
+            raise ConfigError(
+                f"{setting} = {shown(given)}: must be an axis and where the plane cuts it, as in {last}=0.5 [D]"
+            )
         return cls(axis, place)
 
     @property

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -10,12 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alsph.analysis import sampling
+from alsph.analysis.probes import Probes
+from alsph.analysis.vortices import DERIVED, vorticity
 from alsph.arrays import AXES, FloatArray
-from alsph.errors import ConfigError
+from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import vtkhdf
 from alsph.folder.durable import check_target, replacing
 from alsph.geometry.domain import Domain
+from alsph.geometry.lattice import cell_counts, cell_middles, lattice
 from alsph.geometry.particles import Snapshot
+from alsph.parameters import choose
 from alsph.text import shown
 
 if TYPE_CHECKING:
@@ -27,7 +33,7 @@ MOST_POINTS, LARGEST = 20_000_000, 1e15
 
 FORMATS = {"vtkhdf": ".vtkhdf", "netcdf": ".nc", "csv": ".csv"}
 """Formats of grids, and how their files end."""
-UNITS = {"velocity": "U", "pressure": "rho U^2", "vorticity": "U/D"}
+UNITS = {"velocity": "U", "pressure": "rho U^2", "vorticity": "U/D", **dict.fromkeys(DERIVED, "U^2/D^2")}
 
 
 def table(history: dict[str, FloatArray]) -> pandas.DataFrame:
@@ -48,7 +54,8 @@ class Grid:
         Coordinates along ``x``, ``y`` and, in 3-D, ``z`` [D].
     fields : dict of ndarray
         ``velocity`` (nx, ny, 2) [U], ``pressure`` (nx, ny) [ρU²] and ``vorticity`` (nx, ny) [U/D]; in 3-D velocity
-        and vorticity are of shape (nx, ny, nz, 3). NaN in bodies and where there is no fluid.
+        and vorticity are of shape (nx, ny, nz, 3). Also ``q_criterion`` and ``lambda_2`` [U²/D²], of the shape of the
+        pressure, if they were asked for. NaN in bodies and where there is no fluid.
     """
 
     time: float
@@ -57,25 +64,11 @@ class Grid:
 
     def components(self) -> dict[str, FloatArray]:
         """Return the fields with each component of a vector by itself: ``velocity_x``, ``velocity_y``, ..."""
-        found = {}
-        for name, values in self.fields.items():
-            if values.ndim == len(self.axes):
-                found[name] = values
-            else:
-                found |= {f"{name}_{axis}": values[..., k] for k, axis in enumerate(self.axes)}
-        return found
+        return dict(_components(self.fields, len(self.axes)))
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the grid as a data set of xarray."""
-        names = [*self.axes]
-        fields = {
-            name: (names, values, {"long_name": name.replace("_", " along "), "units": UNITS[name.split("_")[0]]})
-            for name, values in self.components().items()
-        }
-        coordinates = {name: (name, line, {"units": "D"}) for name, line in self.axes.items()}
-        attributes = {"time": self.time, "time_units": "D/U"}
-        dataset: xarray.Dataset = _library("xarray").Dataset(fields, coordinates, attributes)
-        return dataset.transpose(*reversed(names))
+        return _dataset(self.axes, self.fields).assign_attrs(time=self.time, time_units="D/U")
 
     def save(self, path: str | Path) -> Path:
         """Write the grid to a file, whose suffix says the format, and return its path.
@@ -117,47 +110,138 @@ class Grid:
         np.savetxt(path, rows, "%.9g", ",", header=",".join(columns), comments="")
 
 
+@dataclass(frozen=True, eq=False)
+class PlaneRecord:
+    """Velocity and pressure that a run recorded on a plane, at points of a grid; NaN in bodies; see `planes`.
+
+    Attributes
+    ----------
+    time : ndarray, shape (k,)
+        Times [D/U].
+    axes : dict of ndarray
+        Coordinates along the axes that the plane extends along, of ``x``, ``y`` and ``z`` [D].
+    place : dict of float
+        Its place on the others [D].
+    velocity : ndarray, shape (k, ..., d)
+        Velocities [U], with an axis for each of `axes`.
+    pressure : ndarray, shape (k, ...)
+        Pressures [ρU²].
+    """
+
+    time: FloatArray
+    axes: dict[str, FloatArray]
+    place: dict[str, float]
+    velocity: FloatArray
+    pressure: FloatArray
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the record as a data set of xarray.
+
+        Raises
+        ------
+        ConfigError
+            If xarray is not installed.
+        """
+        axes = {"time": self.time, **self.axes}
+        return _dataset(axes, {"velocity": self.velocity, "pressure": self.pressure}).assign_coords(self.place)
+
+
+def plane_records(found: Probes, grids: list[tuple[FloatArray, ...]]) -> list[PlaneRecord]:
+    """Return what was recorded on each plane, given by the coordinates of its points along x, y and z.
+
+    Raises
+    ------
+    RunFolderError
+        If it was recorded on others.
+    """
+    counts = [math.prod(map(len, axes)) for axes in grids]
+    if len(found.time) and sum(counts) != len(found.position):
+        raise RunFolderError(
+            f"planes.h5: holds {len(found.position)} points, and the planes of case.toml have {sum(counts)}; "
+            "one of the two files is of another run"
+        )
+    ends, records = np.cumsum([0, *counts]), []
+    for axes, first, end in zip(grids, ends[:-1], ends[1:], strict=True):
+        extended = {name: line for name, line in zip(AXES, axes, strict=False) if len(line) > 1}
+        place = {name: float(line[0]) for name, line in zip(AXES, axes, strict=False) if len(line) == 1}
+        shape = len(found.time), *map(len, extended.values())
+        velocity = found.velocity[:, first:end].reshape(*shape, len(axes))
+        records.append(PlaneRecord(found.time, extended, place, velocity, found.pressure[:, first:end].reshape(shape)))
+    return records
+
+
+def _components(fields: dict[str, FloatArray], axes: int) -> Iterator[tuple[str, FloatArray]]:
+    """Yield fields on a number of axes by name, each component of a vector by itself."""
+    for name, values in fields.items():
+        if values.ndim == axes:
+            yield name, values
+        else:
+            yield from ((f"{name}_{axis}", values[..., k]) for k, axis in enumerate(AXES[: values.shape[-1]]))
+
+
+def _dataset(axes: dict[str, FloatArray], fields: dict[str, FloatArray]) -> xarray.Dataset:
+    """Return fields as a data set of xarray: over time, if it is among the axes, then along z, y and x."""
+    columns = {
+        name: ([*axes], values, {"long_name": _long_name(name, own), "units": UNITS[own]})
+        for own, field in fields.items()
+        for name, values in _components({own: field}, len(axes))
+    }
+    lines = {name: (name, line, {"units": "D/U" if name == "time" else "D"}) for name, line in axes.items()}
+    dataset: xarray.Dataset = _library("xarray").Dataset(columns, lines)
+    return dataset.transpose(*[name for name in ("time", *reversed(AXES)) if name in axes])
+
+
+def _long_name(name: str, field: str) -> str:
+    return field.replace("_", " ") + (f" along {name[-1]}" if name != field else "")
+
+
 def grid(
     snapshot: Snapshot,
     own_spacing: float,
     spacing: float | None,
     box: tuple[FloatArray, FloatArray],
     domain: Domain,
+    derived: Sequence[str] = (),
 ) -> Grid:
     """Return the fields of a snapshot on a regular grid; see :meth:`alsph.Run.to_grid`."""
     spacing = own_spacing if spacing is None else spacing
     if not (isinstance(spacing, int | float) and 0 < spacing < LARGEST):
         raise ConfigError(f"spacing = {shown(spacing)}: must be a number above zero [D]")
     lower, upper = box
-    cells = np.maximum(1.0, np.round((upper - lower) / spacing))
-    if cells.prod() > MOST_POINTS:
+    for name in derived:
+        choose("field", name, DERIVED)
+    counts = cell_counts(lower, upper, spacing)
+    if counts.prod() > MOST_POINTS:
         raise ConfigError(f"spacing = {spacing:g}: more than {MOST_POINTS:,} points; use a larger one or a smaller box")
-    counts = cells.astype(int)
-    axes = {
-        name: low + (np.arange(count) + 0.5) * (high - low) / count
-        for name, low, high, count in zip(AXES, lower, upper, counts, strict=False)
-    }
-    points = np.stack([line.ravel() for line in np.meshgrid(*axes.values(), indexing="ij")], axis=1)
+    axes = dict(zip(AXES, cell_middles(lower, upper, counts), strict=False))
+    points = lattice(*axes.values())
     found = sampling.at(snapshot, points, own_spacing, domain)
-    turning = found["velocity_gradient"]
-    turning = turning - np.swapaxes(turning, 1, 2)  # [:, k, l] is du_k/dx_l - du_l/dx_k
-    vorticity = turning[:, 1, 0] if len(axes) == 2 else turning[:, [2, 0, 1], [1, 2, 0]]
-    fields = {"velocity": found["velocity"], "pressure": found["pressure"], "vorticity": vorticity}
-    solid = sampling.in_solid(snapshot, points)
+    gradient = found["velocity_gradient"]
+    fields = {"velocity": found["velocity"], "pressure": found["pressure"], "vorticity": vorticity(gradient)}
+    fields |= {name: DERIVED[name](gradient) for name in derived}
+    solid = sampling.in_solid(snapshot.position, snapshot.fluid, points)
     for values in fields.values():
         values[solid] = np.nan
+    shape = [*map(len, axes.values())]
     return Grid(
-        snapshot.time, axes, {name: values.reshape(*counts, *values.shape[1:]) for name, values in fields.items()}
+        snapshot.time, axes, {name: values.reshape(*shape, *values.shape[1:]) for name, values in fields.items()}
     )
 
 
-def cloud(snapshot: Snapshot) -> pyvista.PolyData:
+def cloud(snapshot: Snapshot, spacing: float, domain: Domain, derived: Sequence[str] = ()) -> pyvista.PolyData:
     """Return the particles of a snapshot; see :meth:`alsph.Run.to_pyvista`."""
+    for name in derived:
+        choose("field", name, DERIVED)
     points = vtkhdf.three_components(snapshot.position)
     found: pyvista.PolyData = _library("pyvista", "3d").PolyData(points)
     found["velocity"] = vtkhdf.three_components(snapshot.velocity)
     for name in ("pressure", "velocity_divergence", "vorticity", "kind"):
         found[name] = getattr(snapshot, name)
+    if derived:
+        gradient = sampling.at(snapshot, snapshot.position, spacing, domain)["velocity_gradient"]
+        gradient[~snapshot.fluid] = np.nan
+        for name in derived:
+            found[name] = DERIVED[name](gradient)
     found.field_data["time"] = [snapshot.time]
     return found
 

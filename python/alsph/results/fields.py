@@ -1,4 +1,4 @@
-"""What a run folder holds: history, snapshots and probes, and the fields at points and on grids that come of them."""
+"""What a run folder holds: history, snapshots, probes, planes, and fields at points and on grids that come of them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from alsph.folder import reading
 from alsph.geometry.particles import Snapshot
 from alsph.geometry.points import checked_box, checked_points
 from alsph.results import export
-from alsph.results.export import Grid
+from alsph.results.export import Grid, PlaneRecord
 from alsph.text import shown
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class Fields:
-    """The part of :class:`alsph.Run` that reads history, particles and probes."""
+    """The part of :class:`alsph.Run` that reads history, particles, probes and planes."""
 
     path: Path
     case: dict[str, Any]
@@ -77,6 +77,19 @@ class Fields:
     def probes(self) -> Probes:
         """Velocity and pressure at the probes over time; empty without any."""
         return reading.probes(self.path / "probes.h5", self.config.case.space_dimensions)
+
+    @cached_property
+    def planes(self) -> list[PlaneRecord]:
+        """Velocity and pressure on each of the run's planes over time; none without any.
+
+        Raises
+        ------
+        RunFolderError
+            If the file is damaged, or of other planes than the configuration's.
+        """
+        grids = self.config.planes
+        found = reading.probes(self.path / "planes.h5", self.config.case.space_dimensions)
+        return export.plane_records(found, grids)
 
     def sample(self, points: ArrayLike, time: float | None = None) -> dict[str, FloatArray]:
         """Velocity, pressure and their gradients at any points of a snapshot.
@@ -127,6 +140,7 @@ class Fields:
         spacing: float | None = None,
         lower: Sequence[float] | None = None,
         upper: Sequence[float] | None = None,
+        derived: Sequence[str] = (),
     ) -> Grid:
         """Return velocity, pressure and vorticity of a snapshot on a regular grid, by :meth:`sample`; NaN in bodies.
 
@@ -141,16 +155,18 @@ class Fields:
         lower, upper : sequence of float, optional
             Corners of the box that is covered with cells, whose middles the values are of [D]; those of the domain if
             None.
+        derived : sequence of {"q_criterion", "lambda_2"}
+            Fields that are computed from the velocity gradient, too.
 
         Raises
         ------
         ConfigError
-            If there is no such grid.
+            If there is no such grid or field.
         """
         domain = self.config.case.checked_domain
         corners = domain.lower if lower is None else lower, domain.upper if upper is None else upper
         box = checked_box(*corners, domain.dimensions)
-        return export.grid(self.snapshot(time), self.spacing, spacing, box, domain)
+        return export.grid(self.snapshot(time), self.spacing, spacing, box, domain, derived)
 
     def to_xarray(
         self,
@@ -158,6 +174,7 @@ class Fields:
         spacing: float | None = None,
         lower: Sequence[float] | None = None,
         upper: Sequence[float] | None = None,
+        derived: Sequence[str] = (),
     ) -> xarray.Dataset:
         """Return :meth:`to_grid`, which says what the parameters are, as a data set of xarray.
 
@@ -166,17 +183,19 @@ class Fields:
         ConfigError
             If xarray is not installed, or there is no such grid.
         """
-        return self.to_grid(time, spacing, lower, upper).to_xarray()
+        return self.to_grid(time, spacing, lower, upper, derived).to_xarray()
 
-    def to_pyvista(self, time: float | None = None) -> pyvista.PolyData:
+    def to_pyvista(self, time: float | None = None, derived: Sequence[str] = ()) -> pyvista.PolyData:
         """Return the particles of the snapshot nearest to a time [D/U], of the last one if None, as points of pyvista.
+
+        With the fields `derived` of them as :meth:`to_grid` has them.
 
         Raises
         ------
         ConfigError
-            If pyvista is not installed (``pip install 'alsph[3d]'``).
+            If pyvista is not installed (``pip install 'alsph[3d]'``), or there is no such field.
         """
-        return export.cloud(self.snapshot(time))
+        return export.cloud(self.snapshot(time), self.spacing, self.config.case.checked_domain, derived)
 
     def momentum_balance(self, lower: tuple[float, ...], upper: tuple[float, ...]) -> FloatArray:
         """Mean force coefficients from the momentum balance of a box around the body: a check of the recorded loads.

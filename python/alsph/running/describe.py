@@ -1,5 +1,6 @@
 """What a run will take, before it is started."""
 
+import math
 import time as clock
 
 import numpy as np
@@ -9,7 +10,7 @@ from alsph.config import Config
 from alsph.engine.simulation import Simulation
 from alsph.errors import SolverError
 from alsph.geometry.particles import Kind
-from alsph.running.outputs import remarks_of
+from alsph.running.outputs import PLANE_INTERVAL, remarks_of
 from alsph.text import duration
 from alsph.units import Units
 
@@ -59,6 +60,17 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
             text = f"ΔtU/Δx < {limit:.4g} at u_max = {case.velocity_max:g} U{' (binds)' if name == binding else ''}"
             lines.append((f"{name.replace('_', ' ')} limit", text))
     lines += _in_si(case.units, step * case.particle_spacing, config.until) if case.units else []
+    if points := sum(math.prod(map(len, axes)) for axes in config.planes):
+        interval = config.run.plane_interval or PLANE_INTERVAL
+        size = (
+            8
+            * points
+            * (case.space_dimensions + 1)
+            * config.until
+            / max(interval, step * case.particle_spacing)
+            / 2**20
+        )
+        lines.append(("planes", f"{points:,} points, recorded every {interval:g} D/U: about {size:.2g} MiB"))
     lines.append(("steps", f"about {steps:,.0f} to t* = {config.until:g}"))
     if probe:
         try:

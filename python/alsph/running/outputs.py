@@ -2,30 +2,35 @@
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from alsph.analysis.sampling import in_solid
 from alsph.arrays import FloatArray
 from alsph.config import Config
 from alsph.engine.output import Output
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError
 from alsph.folder import samples
+from alsph.geometry.lattice import lattice
 from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
 
 PROBE_INTERVAL = 0.05
 """Time between two records of probes where none is given [D/U]."""
 
+PLANE_INTERVAL = 0.5
+"""The same of planes."""
+
 
 class Samples:
     """Fields at fixed points over time."""
 
-    def __init__(self, file: str, interval: float, points: Mapping[str, FloatArray]) -> None:
+    def __init__(self, file: str, interval: float, points: Mapping[str, NDArray[Any]]) -> None:
         self.file, self.interval, self.points = file, interval, points
         self.taken: list[tuple[float, Mapping[str, FloatArray]]] = []
 
@@ -48,6 +53,18 @@ class Samples:
     def truncate(self, path: Path, time: float) -> None:
         """Drop later samples."""
         samples.truncate(path, time)
+
+
+class Planes(Samples):
+    """Fields on planes over time, NaN in bodies, which they may go through."""
+
+    def sample(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> dict[str, FloatArray]:
+        """Return the ``velocity`` (m, d) and ``pressure`` (m,) at the points."""
+        found, state = super().sample(simulation, rows), simulation.state()
+        solid = in_solid(state["position"], state["kind"] != Kind.SOLID, self.points["position"])
+        for values in found.values():
+            values[solid] = np.nan
+        return found
 
 
 class SurfacePressure(Samples):
@@ -87,14 +104,14 @@ def _in_a_body(probes: FloatArray, state: Mapping[str, Any]) -> list[str]:
 
 
 def outputs_of(config: Config) -> list[Output]:
-    """Return what a run records: the pressure on the surface of its body, if it has one, probes, what its case adds.
+    """Return what a run records: the pressure on the surface of its body, probes, planes, and what its case adds.
 
     Raises
     ------
     ConfigError
-        If an output of the case has a name or an interval that cannot be, or a probe is not in the domain.
+        If an output of the case has a name or an interval that cannot be, or a probe or plane is not in the domain.
     """
-    points, own, run = config.case.surface_points(), config.case.outputs(), config.run
+    own = config.case.outputs()
     for output in own:
         if not (isinstance(output.file, str) and re.fullmatch(r"output_\w+\.\w+", output.file)):
             raise ConfigError(
@@ -105,9 +122,18 @@ def outputs_of(config: Config) -> list[Output]:
     for name, count in Counter(output.file for output in own).items():
         if count > 1:
             raise ConfigError(f"case '{config.case.name}': {count} outputs have the file {name}; one file, one output")
-    probes = config.probes
-    return [
-        *([SurfacePressure(points, run.surface_interval)] if points else []),
-        *([Samples("probes.h5", run.probe_interval or PROBE_INTERVAL, {"position": probes})] if len(probes) else []),
-        *own,
-    ]
+    return [*_samples_of(config), *own]
+
+
+def _samples_of(config: Config) -> Iterator[Samples]:
+    """Yield the pressure on the surface of a body, probes and planes, where there are some."""
+    run, points, probes = config.run, config.case.surface_points(), config.probes
+    planes = [lattice(*axes) for axes in config.planes]
+    if points:
+        yield SurfacePressure(points, run.surface_interval)
+    if len(probes):
+        yield Samples("probes.h5", run.probe_interval or PROBE_INTERVAL, {"position": probes})
+    if planes:
+        number = np.repeat(np.arange(len(planes)), [*map(len, planes)])
+        where = {"position": np.concatenate(planes), "plane": number}
+        yield Planes("planes.h5", run.plane_interval or PLANE_INTERVAL, where)
