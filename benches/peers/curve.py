@@ -31,11 +31,11 @@ PICTURE = HERE.parents[1] / "docs" / "images" / "cost_error.png"
 
 # What a way of computing is called, its driver and arguments, and how it is drawn.
 VARIANTS = {
-    "alsph": ("alsph", "alsph", [], "C0o-"),
-    "paper": ("the paper's Algorithm 2, in alsph", "alsph", ["--paper"], "C2s-"),
-    "edac": ("PySPH, EDAC", "pysph", ["--scheme=edac", "--cache"], "C1^-"),
-    "sisph": ("PySPH, SISPH", "pysph", ["--scheme=sisph", "--cache"], "C3v-"),
-    "sphinxsys": ("SPHinXsys", "sphinxsys", ["--relaxed"], "C4D-"),
+    "alsph": ("alsph", "alsph", [], "o-"),
+    "paper": ("the paper's Algorithm 2, in alsph", "alsph", ["--paper"], "s-"),
+    "edac": ("PySPH, EDAC", "pysph", ["--scheme=edac", "--cache"], "^-"),
+    "sisph": ("PySPH, SISPH", "pysph", ["--scheme=sisph", "--cache"], "v-"),
+    "sphinxsys": ("SPHinXsys", "sphinxsys", ["--relaxed"], "D-"),
 }
 
 # Case: end and window of the averages, resolutions, variants, and what the error is of.
@@ -105,9 +105,10 @@ def plot(path: Path) -> None:
         figure.subplots(1, len(CASES)), CASES.items(), strict=True
     ):
         for variant in variants:
+            colour = plotting.PALETTE[list(VARIANTS).index(variant)]
             found = [rows[case, variant, n] for n in resolutions if (case, variant, n) in rows]
             cost, errors = [row["cpu_per_time"] for row in found], [100 * error(case, row) for row in found]
-            axes.loglog(cost, errors, VARIANTS[variant][3], ms=5, lw=1, label=VARIANTS[variant][0])
+            axes.loglog(cost, errors, VARIANTS[variant][3], color=colour, ms=5, lw=1, label=VARIANTS[variant][0])
             for row, x, y in zip(found, cost, errors, strict=True):
                 axes.annotate(f"{row['resolution']}", (x, y), textcoords="offset points", xytext=(4, 4), fontsize=7)
         axes.set_title(title, fontsize=10)

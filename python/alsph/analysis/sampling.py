@@ -65,9 +65,7 @@ def at(snapshot: Snapshot, points: FloatArray, spacing: float, domain: Domain) -
     lower = np.array(domain.lower)
     points = np.where(domain.periodic, lower + (points - lower) % domain.size, points)
     position, fields = with_images(snapshot.position[fluid], fields, domain, REACH * spacing)
-    parts = [points[first : first + CHUNK] for first in range(0, max(len(points), 1), CHUNK)]
-    found = [interpolate(position, fields, part, spacing) for part in parts]
-    values, gradients = (np.concatenate(each) for each in zip(*found, strict=True))
+    values, gradients = interpolate_parts(position, fields, points, spacing)
     outside = ~domain.contains(points, 1e-9 * spacing)
     void = outside | (neighbour_tree(position).query(points)[0] > VOID * spacing)
     values[void], gradients[void] = np.nan, np.nan
@@ -124,6 +122,16 @@ def interpolate(
         np.swapaxes(basis, 1, 2) @ (weight * values[index])
     )
     return coefficients[:, 0], np.swapaxes(coefficients[:, 1 : points.shape[1] + 1], 1, 2) / spacing
+
+
+def interpolate_parts(
+    position: FloatArray, values: FloatArray, points: FloatArray, spacing: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return what :func:`interpolate` does, in parts, so that any number of points fits into memory."""
+    parts = [points[first : first + CHUNK] for first in range(0, max(len(points), 1), CHUNK)]
+    found = [interpolate(position, values, part, spacing) for part in parts]
+    own, gradients = (np.concatenate(each) for each in zip(*found, strict=True))
+    return own, gradients
 
 
 def late_velocity(run: Record, points: FloatArray, share: float = 0.25) -> FloatArray:

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from alsph import plotting
+from alsph.analysis.vortices import DERIVED
 from alsph.cases.source import shown_name
 from alsph.cli.options import Plane, Retry, RunPath, Threads, Walltime
 from alsph.cli.terminal import complain, exit_codes, say, say_table
@@ -127,7 +128,11 @@ def _plot(
     path: RunPath,
     field: Annotated[
         list[str] | None,
-        typer.Option(help="field to draw, may be repeated", show_default="vorticity and pressure"),
+        typer.Option(
+            metavar="|".join(plotting.FIELDS),
+            help="field to draw, may be repeated",
+            show_default="vorticity and pressure",
+        ),
     ] = None,
     time: Annotated[float | None, typer.Option(help="time of the fields [D/U]", show_default="the last")] = None,
     body: Annotated[
@@ -137,6 +142,7 @@ def _plot(
     kind: Annotated[str, typer.Option("--format", metavar="png|pdf|svg", help="format of the figures")] = "png",
     dpi: Annotated[int, typer.Option(min=10, max=2400, help="pixels an inch of png")] = 100,
     plane: Plane = None,
+    streamlines: Annotated[bool, typer.Option("--streamlines", help="draw streamlines over the fields")] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="folder for the figures", show_default="RUN/figures")
     ] = None,
@@ -153,7 +159,7 @@ def _plot(
         plotting.field_style(name)
     figures = output or path / "figures"
     drawings = _drawings(run, body or []) | {
-        name: functools.partial(run.plot_field, name, time, plane=plane) for name in names
+        name: functools.partial(run.plot_field, name, time, plane=plane, streamlines=streamlines) for name in names
     }
     if not output:
         check_folder(figures)
@@ -226,6 +232,10 @@ def _export(
     to: Annotated[str | None, typer.Option(metavar="|".join(FORMATS), help="format", show_default="vtkhdf")] = None,
     time: Annotated[float | None, typer.Option(help="time of the fields [D/U]", show_default="the last")] = None,
     spacing: Annotated[float | None, typer.Option(help="of the grid [D]", show_default="the particles'")] = None,
+    field: Annotated[
+        list[str] | None,
+        typer.Option(metavar="|".join(DERIVED), help="field to write, too, may be repeated", show_default="none"),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="file, .vtkhdf, .nc or .csv", show_default="RUN/flow.vtkhdf"),
@@ -239,7 +249,7 @@ def _export(
         choose("to", to, FORMATS)
     if output and to and output.suffix != FORMATS[to]:
         raise ConfigError(f"{output}: a file in the format {to} ends in {FORMATS[to]}")
-    grid = Run(path).to_grid(time, spacing)
+    grid = Run(path).to_grid(time, spacing, derived=field or [])
     if time is not None:
         complain(f"fields at t* = {grid.time:.6g}, the output nearest to {time:g}")
     say(grid.save(output or path / f"flow{FORMATS[to or 'vtkhdf']}"))

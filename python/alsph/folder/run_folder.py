@@ -47,7 +47,7 @@ MARKS = ("case.toml", "run.json")
 OWN = re.compile(
     r"\.?(case\.toml|run\.json|run\.log|\.?lock|(checkpoint(\.previous)?|history|particles|surface|probes|planes|start|breakdown|flow)(\.damaged\d*)?"
     r"\.(h5|csv|vtkhdf|nc))(\.new|\.journal)?"
-    r"|(ledger|((forces|spectrum|pressure_coefficient)(_of_\w+)?)|pressure|vorticity|velocity(_divergence|_at_tu_d_\w+)?|kinetic_energy"
+    r"|(ledger|((forces|spectrum|pressure_coefficient)(_of_\w+)?)|pressure|vorticity|velocity(_divergence|_at_tu_d_\w+)?|q_criterion|lambda_2|kinetic_energy"
     r"|[uv]_at_[xy]_d_2)\.(png|pdf|svg|gif|mp4|webm)"
 )
 """Names of the files that alsph makes in a run folder and its figures, and removes when the folder is replaced."""

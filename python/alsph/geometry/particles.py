@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
 
-Field = Literal["vorticity", "pressure", "velocity", "velocity_divergence"]
+Field = Literal["vorticity", "pressure", "velocity", "velocity_divergence", "q_criterion", "lambda_2"]
 """A field of particles that is drawn."""
 
 

@@ -3,16 +3,18 @@
 from alsph.plotting.animation import Film, animate
 from alsph.plotting.curves import Curve, convergence, panels, pressure_coefficient, profile
 from alsph.plotting.histories import coefficients, forces, ledger, spectrum
-from alsph.plotting.pictures import FIELDS, field, field_style, fields
-from alsph.plotting.style import head, remark, save
+from alsph.plotting.pictures import FIELDS, extent_of, field, field_style, fields
+from alsph.plotting.style import PALETTE, head, remark, save
 
 __all__ = [
     "FIELDS",
+    "PALETTE",
     "Curve",
     "Film",
     "animate",
     "coefficients",
     "convergence",
+    "extent_of",
     "field",
     "field_style",
     "fields",

@@ -14,7 +14,7 @@ from alsph.analysis.measures import Profile
 from alsph.analysis.window import DEVELOPING
 from alsph.arrays import FloatArray
 from alsph.geometry.surface import Surface
-from alsph.plotting.style import blank
+from alsph.plotting.style import MARKERS, PALETTE, blank, line
 from alsph.text import in_figure
 
 if TYPE_CHECKING:
@@ -44,15 +44,15 @@ def pressure_coefficient(
     figure = blank(7, 4.5)
     axes = figure.subplots()
     theta = np.mod(coefficient.theta, 360.0)
-    for side, label, style in (
-        (theta <= 180, "upper side", "C0-"),
-        ((theta >= 180) | (theta == 0), "lower side", "C1--"),
+    for side, label, style, colour in (
+        (theta <= 180, "upper side", "-", PALETTE[0]),
+        ((theta >= 180) | (theta == 0), "lower side", "--", PALETTE[1]),
     ):
         folded = np.where(theta <= 180, theta, 360 - theta)[side]
         order = np.argsort(folded)
         angle, mean, deviation = (a[order] for a in (folded, coefficient.mean[side], coefficient.deviation[side]))
-        axes.plot(angle, mean, style, label=label)
-        axes.fill_between(angle, mean - deviation, mean + deviation, color=style[:2], alpha=0.15, lw=0)
+        axes.plot(angle, mean, style, color=colour, label=label)
+        axes.fill_between(angle, mean - deviation, mean + deviation, color=colour, alpha=0.15, lw=0)
     if reference is not None:
         axes.plot(*reference, "k:", lw=1.5, label="reference")
     axes.set(xlabel=r"$\theta$ from the front stagnation point [degrees]", ylabel="$C_p$", xlim=(0, 180))
@@ -74,13 +74,15 @@ def _pressure_over_chord(
     parts = [int(part) for part in np.unique(surface.part)]
     of = {part: in_figure(names[part] if part < len(names) else str(part)) for part in parts}
     for part in parts:
-        for index, (side, name, line) in enumerate(((1, "upper side", "-"), (-1, "lower side", "--"))):
+        for index, (side, name, style) in enumerate(((1, "upper side", "-"), (-1, "lower side", "--"))):
             chosen = (surface.part == part) & (surface.side == side)
             mean, deviation = coefficient.mean[chosen], coefficient.deviation[chosen]
-            colour, label = (f"C{part % 10}", f"{of[part]}, {name}") if len(parts) > 1 else (f"C{index}", name)
+            number, label = (part, f"{of[part]}, {name}") if len(parts) > 1 else (index, name)
+            drawn = line(number, int(chosen.sum())) if len(parts) > 1 else {"color": PALETTE[number]}
             for axes, abscissa in ((left, chord), (right, surface.arc)):
-                axes.plot(abscissa[chosen], mean, line, color=colour, label=label)
-                axes.fill_between(abscissa[chosen], mean - deviation, mean + deviation, color=colour, alpha=0.15, lw=0)
+                axes.plot(abscissa[chosen], mean, style, label=label, **drawn)
+                band = mean - deviation, mean + deviation
+                axes.fill_between(abscissa[chosen], *band, color=drawn["color"], alpha=0.15, lw=0)
     if reference is not None:
         left.plot(*reference, "k:", lw=1.5, label="reference")
     left.set(xlabel="$x/c$", ylabel="$C_p$, suction up")
@@ -116,11 +118,11 @@ def profile(curves: dict[str, Profile]) -> Figure:
     axes = figure.subplots()
     known: dict[str, tuple[int, str, Profile]] = {}
     for index, (name, curve) in enumerate(curves.items()):
-        axes.plot(*curve.computed, lw=1.2, label=name)
+        axes.plot(*curve.computed, lw=1.2, label=name, **line(index, len(curve.computed[0])))
         if curve.reference[0].size:
             known.setdefault(str(np.array(curve.reference).tolist()), (index, name, curve))
     for index, name, curve in known.values():  # one for all, or that of each in its colour
-        colour, whose = (f"C{index}", f" of {name}") if len(known) > 1 else ("k", "")
+        colour, whose = (PALETTE[index % len(PALETTE)], f" of {name}") if len(known) > 1 else ("k", "")
         axes.plot(*curve.reference, ":", color=colour, lw=1.5, label=f"reference{whose}: {curve.source}")
     axes.set(xlabel=curve.axes[0], ylabel=curve.axes[1])
     axes.set_title(curve.name, fontsize="medium")
@@ -141,7 +143,9 @@ class Curve:
     uncertainty : list of float
         Half lengths of the error bars; none are drawn if empty or zero.
     style : str
-        Matplotlib's format; the next colour and marker if empty.
+        Marker and dashes as matplotlib's format has them; the next marker and a line if empty.
+    colour : str
+        Its colour; the next one if empty.
     """
 
     label: str
@@ -149,6 +153,7 @@ class Curve:
     y: list[float]
     uncertainty: list[float] = dataclass_field(default_factory=list)
     style: str = ""
+    colour: str = ""
 
 
 def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str] = ()) -> Figure:
@@ -169,10 +174,11 @@ def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str
     grid = figure.subplots(rows, columns, squeeze=False).flat
     for axes, (name, curves) in zip(grid, panels.items(), strict=False):
         for index, curve in enumerate(curves):
-            style = curve.style or f"C{index}{'osD^v<>pPX'[index % 10]}-"
-            axes.plot(curve.x, curve.y, style, ms=5, lw=1, label=curve.label)
+            style = curve.style or f"{MARKERS[index % len(MARKERS)]}-"
+            colour = curve.colour or PALETTE[index % len(PALETTE)]
+            axes.plot(curve.x, curve.y, style, color=colour, ms=5, lw=1, label=curve.label)
             if np.nansum(curve.uncertainty) > 0:
-                axes.errorbar(curve.x, curve.y, curve.uncertainty, fmt="none", ecolor=style[:2], capsize=2, lw=1)
+                axes.errorbar(curve.x, curve.y, curve.uncertainty, fmt="none", ecolor=colour, capsize=2, lw=1)
         if "x" in logarithmic:
             axes.set_xscale("log")
             ticks = sorted({x for curve in curves for x in curve.x})
@@ -198,8 +204,8 @@ def convergence(errors: dict[str, dict[int, float]]) -> Figure:
     """
     figure = blank(7, 4.5)
     axes = figure.subplots()
-    for name, series in errors.items():
-        axes.loglog([*series], np.abs([*series.values()]), "o-", label=name)
+    for number, (name, series) in enumerate(errors.items()):
+        axes.loglog([*series], np.abs([*series.values()]), label=name, **line(number, len(series)) | {"markevery": 1})
     resolutions = sorted({resolution for series in errors.values() for resolution in series})
     largest = max(abs(error) for series in errors.values() for error in series.values())
     for order, style in ((1, "k:"), (2, "k--")):

@@ -10,7 +10,7 @@ from alsph.analysis import averages
 from alsph.analysis.averages import Window
 from alsph.analysis.window import DEVELOPING
 from alsph.arrays import FloatArray
-from alsph.plotting.style import TIME_LABEL, blank
+from alsph.plotting.style import PALETTE, TIME_LABEL, blank, line
 from alsph.results.ledger import Ledger
 from alsph.results.run import Run
 
@@ -26,8 +26,8 @@ def forces(run: Run, body: str | None = None) -> Figure:
     time = run.history["time"]
     for axes, axis, symbol in ((upper, "x", "C_D"), (lower, "y", "C_L")):
         parts = {part: run.coefficient(axis, part, body) for part in ("viscous", "pressure", "total")}
-        for (part, values), colour in zip(parts.items(), ("C2", "C1", "C0"), strict=True):
-            axes.plot(time, values, colour, lw=1, label=part)
+        for number, (part, values) in zip((2, 1, 0), parts.items(), strict=True):
+            axes.plot(time, values, lw=1, label=part, **line(number, len(time)))
         if limits := robust_limits([(time, values) for values in parts.values()]):
             axes.set_ylim(limits)
         axes.set_ylabel(f"${symbol}$")
@@ -56,9 +56,11 @@ def coefficients(runs: dict[str, Run]) -> Figure:
     for axes, axis, symbol in ((upper, "x", "C_D"), (lower, "y", "C_L")):
         records = [(run.history["time"], run.coefficient(axis)) for run in runs.values()]
         for index, ((name, run), record) in enumerate(zip(runs.items(), records, strict=True)):
-            axes.plot(*record, f"C{index}", lw=1, label=f"{name}, {DEVELOPING}" if run.window.developing else name)
+            label, drawn = f"{name}, {DEVELOPING}" if run.window.developing else name, line(index, len(record[0]))
+            axes.plot(*record, lw=1, label=label, **drawn)
             if run.window.edges.size:
-                axes.plot([run.window.start, run.window.end], [run.load(axis).mean] * 2, f"C{index}--", lw=1)
+                span = [run.window.start, run.window.end]
+                axes.plot(span, [run.load(axis).mean] * 2, "--", color=drawn["color"], lw=1)
         if limits := robust_limits(records):
             axes.set_ylim(limits)
         axes.set_ylabel(f"${symbol}$")
@@ -83,12 +85,13 @@ def spectrum(runs: dict[str, Run], body: str | None = None) -> Figure:
     figure = blank(9, 6)
     grid = figure.subplots(2, 1, sharex=True)
     for axes, axis, symbol in zip(grid, "xy", ("C_D", "C_L"), strict=True):
-        for name, run in runs.items():
+        for number, (name, run) in enumerate(runs.items()):
             time, window, coefficient = run.history["time"], run.window, run.coefficient(axis, body=body)
             if window.edges.size:
                 lines = averages.amplitude_spectrum(time, coefficient, window.start, window.end)
                 label = f"{name}, {DEVELOPING}" if window.developing else name
-                axes.loglog(*(a[1:] for a in lines), lw=0.8, label=label)
+                drawn = line(number, len(lines[0]) - 1, logarithmic=True)
+                axes.loglog(*(a[1:] for a in lines), lw=0.8, label=label, **drawn)
         axes.set_ylabel(f"amplitude of ${symbol}$")
         axes.grid(alpha=0.3)
         if axes.lines:
@@ -143,8 +146,8 @@ def ledger(run: Run) -> Figure:
     figure = blank(12, 8.5)
     grid = figure.subplots(4, 2, sharex=True)
     for axes, (label, curves) in zip(grid.flat, panels, strict=True):
-        for name, values in curves.items():
-            axes.plot(run.history["time"], values, lw=0.8, label=name)
+        for number, (name, values) in enumerate(curves.items()):
+            axes.plot(run.history["time"], values, lw=0.8, label=name, **line(number, len(values)))
         axes.set_ylabel(label)
         if not curves:
             _energy_budget(axes, run.ledger)
@@ -163,10 +166,10 @@ def _energy_budget(axes: Axes, ledger: Ledger) -> None:
     if not np.isfinite(ledger.dissipation).any():
         axes.text(0.5, 0.5, "no budget: energy enters or leaves with the fluid", ha="center", transform=axes.transAxes)
         return
-    axes.plot(ledger.time, ledger.energy_rate, lw=0.8, label="dE/dt")
-    for label, values, style in (
-        ("- dissipation", -ledger.dissipation, "v"),
-        ("power", ledger.power, "^"),
-        ("imbalance", ledger.imbalance, "kx"),
+    axes.plot(ledger.time, ledger.energy_rate, color=PALETTE[0], lw=0.8, label="dE/dt")
+    for label, values, marker, colour in (
+        ("- dissipation", -ledger.dissipation, "v", PALETTE[1]),
+        ("power", ledger.power, "^", PALETTE[2]),
+        ("imbalance", ledger.imbalance, "x", "k"),
     ):
-        axes.plot(ledger.snapshot_time, values, style, ms=4, label=label)
+        axes.plot(ledger.snapshot_time, values, marker, color=colour, ms=4, label=label)

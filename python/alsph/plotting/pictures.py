@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alsph.analysis import sampling
+from alsph.analysis.vortices import DERIVED
 from alsph.arrays import AXES, FloatArray
 from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind, Snapshot
 from alsph.geometry.plane import Plane
 from alsph.parameters import suggest
 from alsph.plotting.style import TIME_LABEL, blank
+from alsph.results.export import Grid
 from alsph.text import shown
 
 if TYPE_CHECKING:
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 
 
 PIXELS_PER_SPACING = 2
+
+DENSITY = 1.5  # of streamlines: 45 along each side at most
 
 LARGEST_VIEW = 20_000  # spacings that a picture is wide or high at most
 
@@ -41,6 +45,8 @@ FIELDS = {
     "pressure": FieldStyle(r"pressure $p\,/\,\rho U^2$", "RdBu_r", True),
     "velocity": FieldStyle(r"velocity $|\mathbf{u}|/U$", "viridis", False),
     "velocity_divergence": FieldStyle(r"velocity divergence $\nabla\cdot\mathbf{u}\,D/U$", "PuOr_r", True),
+    "q_criterion": FieldStyle(r"$Q\,D^2/U^2$", "PuOr_r", True),
+    "lambda_2": FieldStyle(r"$\lambda_2\,D^2/U^2$", "PuOr", True),  # vortices in the same colour
 }
 
 
@@ -67,13 +73,14 @@ def field(
     title: str = "",
     width: float = 9.0,
     plane: Plane | None = None,
+    flow: Grid | None = None,
 ) -> Figure:
     """Picture of a field in 2-D or along a plane, the bodies in grey.
 
     Parameters
     ----------
     snapshot : Snapshot
-    name : {"vorticity", "pressure", "velocity", "velocity_divergence"}
+    name : {"vorticity", "pressure", "velocity", "velocity_divergence", "q_criterion", "lambda_2"}
     spacing : float
         Particle spacing Δx [D].
     limit : float, optional
@@ -86,6 +93,8 @@ def field(
         Width of the figure in inches.
     plane : Plane, optional
         The plane in 3-D.
+    flow : Grid, optional
+        The flow whose streamlines are drawn, in 3-D on the plane and along it.
 
     Raises
     ------
@@ -97,6 +106,8 @@ def field(
     figure = blank(width, max(2.5, 0.81 * width * (top - bottom) / (right - left) + 0.75), "compressed")
     axes = figure.subplots()
     _draw_field(axes, snapshot, name, spacing, part, limit, plane)
+    if flow is not None:
+        _draw_streamlines(axes, flow, part, plane)
     where = f"${AXES[plane.axis]}/D$ = {plane.place:g}, " if plane else ""
     axes.set_title(f"{title}, " * bool(title) + where + f"{TIME_LABEL} = {snapshot.time:.2f}")
     return figure
@@ -164,6 +175,19 @@ def _draw_field(
     return limit
 
 
+def _draw_streamlines(axes: Axes, flow: Grid, extent: tuple[float, float, float, float], plane: Plane | None) -> None:
+    """Draw the streamlines of a flow on a grid, which has one layer in 3-D; there are none in bodies."""
+    across, velocity = [0, 1], flow.fields["velocity"]
+    if plane:
+        across, velocity = plane.across, np.take(velocity, 0, axis=plane.axis)
+    if np.isfinite(velocity).any():
+        x, y = (flow.axes[AXES[axis]] for axis in across)
+        u, v = (np.ma.masked_invalid(velocity[..., axis].T) for axis in across)
+        axes.streamplot(x, y, u, v, density=DENSITY, color="0.1", linewidth=0.6, arrowsize=0.7)
+    left, right, bottom, top = extent
+    axes.set(xlim=(left, right), ylim=(bottom, top))
+
+
 def colour_limit(
     snapshot: Snapshot,
     name: str,
@@ -175,11 +199,16 @@ def colour_limit(
     return _limit(_raster(snapshot, name, spacing, extent, plane)[0])
 
 
-def _values(snapshot: Snapshot, name: str) -> FloatArray:
+def _values(snapshot: Snapshot, name: str, whole: Snapshot, spacing: float) -> FloatArray:
+    """Return a field at the fluid particles of a snapshot, which is a part of the whole one."""
+    if name in DERIVED:
+        fluid, known = snapshot.position[snapshot.fluid], whole.fluid
+        gradient = sampling.interpolate_parts(whole.position[known], whole.velocity[known], fluid, spacing)[1]
+        return DERIVED[name](gradient)
     values = np.linalg.norm(snapshot.velocity, axis=1) if name == "velocity" else getattr(snapshot, name)
     if name == "pressure" and _is_closed(snapshot):
         values = values - values[snapshot.fluid].mean()  # which means nothing, and would leave one colour
-    return np.asarray(values)
+    return np.asarray(values[snapshot.fluid])
 
 
 def _is_closed(snapshot: Snapshot) -> bool:
@@ -216,10 +245,11 @@ def _raster(
     x = left + (np.arange(columns) + 0.5) * (right - left) / columns
     y = bottom + (np.arange(rows) + 0.5) * (top - bottom) / rows
     points = np.stack([grid.ravel() for grid in np.meshgrid(x, y)], axis=1)
+    whole = snapshot
     if plane is not None:
         points, snapshot = plane.points(points), plane.near(snapshot, spacing)
-    fluid, values = snapshot.fluid, _values(snapshot, name)
-    picture = sampling.average(snapshot.position[fluid], values[fluid], points, spacing).reshape(rows, columns)
+    fluid, values = snapshot.fluid, _values(snapshot, name, whole, spacing)
+    picture = sampling.average(snapshot.position[fluid], values, points, spacing).reshape(rows, columns)
     if fluid.all():
         return picture, np.zeros_like(picture)
     body = sampling.fill(snapshot.position[~fluid], points, spacing)

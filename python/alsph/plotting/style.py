@@ -6,6 +6,8 @@ import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from alsph.errors import ConfigError
 from alsph.folder.durable import check_target, replacing
 from alsph.parameters import suggest
@@ -15,6 +17,33 @@ if TYPE_CHECKING:
 
 
 TIME_LABEL = "$tU/D$"
+
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+"""Colours of curves: those of Okabe and Ito (2008), which the colour-blind tell apart, but for black and yellow."""
+
+MARKERS = "osD^v<>pPX"
+"""What tells curves apart in print, and to who sees no colours."""
+
+MARKED = 8
+"""Number of markers of a curve that has a point a step."""
+
+
+def line(number: int, points: int, *, logarithmic: bool = False) -> dict[str, Any]:
+    """Return how matplotlib is to draw one of several curves: its colour, and markers at some of its points.
+
+    Parameters
+    ----------
+    number : int
+        Number of the curve in the figure, from 0.
+    points : int
+        How many points it has.
+    logarithmic : bool
+        Whether they stand closer and closer on the abscissa.
+    """
+    places = (np.arange(MARKED) + 0.5 + 0.15 * (number % 4)) / MARKED  # not on those of the next curve
+    index = np.unique(points**places - 1 if logarithmic else (points - 1) * places).astype(int)
+    marker = {"marker": MARKERS[number % len(MARKERS)], "ms": 4, "markevery": index[(index >= 0) & (index < points)]}
+    return {"color": PALETTE[number % len(PALETTE)], **marker}
 
 
 def blank(width: float, height: float, layout: Literal["constrained", "compressed"] = "constrained") -> Figure:

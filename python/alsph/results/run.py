@@ -24,6 +24,7 @@ from alsph.geometry.particles import Field, Snapshot
 from alsph.geometry.plane import Plane
 from alsph.parameters import choose
 from alsph.results.dimensional import dimensional
+from alsph.results.export import Grid
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.loads import Loads
 from alsph.results.outcome import outcome
@@ -32,6 +33,10 @@ from alsph.units import Units
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+STREAMLINE_CELLS = 300
+"""Along the longer side of a picture, at most."""
 
 
 class Run(Loads):
@@ -212,12 +217,13 @@ class Run(Loads):
         limit: float | None = None,
         view: tuple[float, float, float, float] | None = None,
         plane: str | None = None,
+        streamlines: bool = False,
     ) -> Figure:
         """Picture of a field, in 3-D along a plane; saved if `path` is given.
 
         Parameters
         ----------
-        name : {"vorticity", "pressure", "velocity", "velocity_divergence"}
+        name : {"vorticity", "pressure", "velocity", "velocity_divergence", "q_criterion", "lambda_2"}
         time : float, optional
             Time tU/D; the nearest snapshot is shown, the last one if None.
         path : path, optional
@@ -229,14 +235,29 @@ class Run(Loads):
         plane : str, optional
             In 3-D the plane, such as ``"z=0.5"`` or ``"y"`` [D]; by default normal to z through the middle of the body,
             or of the flow.
+        streamlines : bool
+            Draw streamlines over it, in 3-D those of the velocity along the plane.
         """
         _plotting().field_style(name)
         snapshot = self.snapshot(time)
         plane_of = self.plane(snapshot, plane)
+        part = _plotting().extent_of(snapshot, self.spacing, view, plane_of)
+        flow = self._flow(snapshot.time, part, plane_of) if streamlines else None
         figure = _plotting().field(
-            snapshot, name, self.spacing, limit=limit, view=view, title=self._title, plane=plane_of
+            snapshot, name, self.spacing, limit=limit, view=part, title=self._title, plane=plane_of, flow=flow
         )
         return self._saved(figure, path, headed=True)
+
+    def _flow(self, time: float, view: tuple[float, float, float, float], plane: Plane | None) -> Grid:
+        """Return the flow in a view, on a grid of one layer in 3-D, that is fine enough for streamlines."""
+        left, right, bottom, top = view
+        sides = sorted((right - left, top - bottom))
+        spacing = min(max(self.spacing, sides[1] / STREAMLINE_CELLS), sides[0] / 8)
+        lower, upper = np.array([left, bottom]), np.array([right, top])
+        if plane:
+            lower = np.insert(lower, plane.axis, plane.place - spacing / 2)
+            upper = np.insert(upper, plane.axis, plane.place + spacing / 2)
+        return self.to_grid(time, spacing, lower.tolist(), upper.tolist())
 
     def plane(self, snapshot: Snapshot, given: str | None = None) -> Plane | None:
         """Return the plane of pictures of a snapshot, None in 2-D; `given` as of :meth:`plot_field`."""
@@ -251,7 +272,7 @@ class Run(Loads):
 
         Parameters
         ----------
-        name : {"vorticity", "pressure", "velocity", "velocity_divergence"}
+        name : {"vorticity", "pressure", "velocity", "velocity_divergence", "q_criterion", "lambda_2"}
         path : path, optional
             File that ends in .gif or, with imageio-ffmpeg (``pip install 'alsph[video]'``), .mp4 or .webm; ``NAME.gif``
             among the run's figures if None.

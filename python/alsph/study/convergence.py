@@ -192,9 +192,9 @@ class Report:
             curves = [Curve("alsph", spacing, list(found.values))]
             if np.isfinite(found.richardson):
                 band = [abs(found.index * found.values[-1])]
-                curves.append(Curve("Richardson, ± GCI", [0.0], [found.richardson], band, style="C1s"))
+                curves.append(Curve("Richardson, ± GCI", [0.0], [found.richardson], band, style="s"))
             if np.isfinite(found.reference) and found.reference:
-                curves.append(Curve("reference", [0.0, max(spacing)], [found.reference] * 2, style="k--"))
+                curves.append(Curve("reference", [0.0, max(spacing)], [found.reference] * 2, style="--", colour="k"))
             panels[found.name] = curves
         return plotting.panels(panels, r"$\Delta x/D$")
 

@@ -274,11 +274,11 @@ class Results:
             curves = [Curve(name, *_sorted(points)) for name, points in series.items()]
             early = [point for points in series.values() for point in points if remark(point[1])]
             if early:
-                curves.append(Curve(DEVELOPING, *_sorted(early)[:2], style="rx"))
+                curves.append(Curve(DEVELOPING, *_sorted(early)[:2], style="x", colour="k"))
             if known:
-                curves.append(Curve("reference", *_sorted(list(known.items())), style="k--"))
+                curves.append(Curve("reference", *_sorted(list(known.items())), style="--", colour="k"))
             curves += [
-                Curve(other.label, [other.parameters[figure.x]], [other.values[y]], style=marker)
+                Curve(other.label, [other.parameters[figure.x]], [other.values[y]], style=marker, colour="k")
                 for other, marker in zip(self.study.published, _MARKERS, strict=False)
                 if figure.x in other.parameters and y in other.values
             ]
@@ -314,7 +314,7 @@ _LEGEND = {
     "time_step": "$\\Delta tU/\\Delta x$ = {value}",
     "max_iterations": "{value} iterations",
 }
-_MARKERS = ("k*", "kx", "k+", "k^", "kv", "ks", "kd")
+_MARKERS = "*+1234d"
 SNAPSHOTS_AT_LIFT = 10
 
 
