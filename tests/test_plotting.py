@@ -1,6 +1,7 @@
 import sys
 from dataclasses import replace
 
+import matplotlib
 import numpy as np
 import pytest
 from alsph import Run, plotting
@@ -11,7 +12,9 @@ from alsph.errors import ConfigError
 from alsph.folder.run_folder import RunFolder
 from alsph.geometry.particles import Snapshot
 from alsph.plotting.pictures import _limit
+from alsph.plotting.style import line
 from alsph.study.results import names
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 from synthetic import append_surface, history, write_flow, write_run
@@ -203,3 +206,56 @@ def test_pictures_of_several_runs_tell_the_time_of_each(run):
     pictures = {"one": (run.snapshot(10), run.spacing), "other": (run.snapshot(30), run.spacing)}
     titles = [axes.get_title() for axes in plotting.fields(pictures, ["vorticity"]).axes if axes.get_title()]
     assert titles == ["one, $tU/D$ = 10.00", "other, $tU/D$ = 30.00"]
+
+
+DEUTERAN = np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]])
+PROTAN = np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]])
+"""What of linear RGB those see who lack green or red cones (Machado, Oliveira and Fernandes 2009)."""
+
+
+def as_seen(colours, eyes):
+    """Return colours (n, 3) in CIELAB as eyes see them."""
+    rgb = np.array([to_rgb(colour) for colour in colours])
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    seen = np.clip(linear @ eyes.T, 0, 1)
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    x, y, z = np.cbrt(np.maximum(seen @ to_xyz.T / to_xyz.sum(axis=1), 0.008856)).T
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=1)
+
+
+def nearest_colours(colours):
+    """Return the least distance of two colours to any of three kinds of eyes."""
+    seen = (as_seen(colours, eyes) for eyes in (np.eye(3), DEUTERAN, PROTAN))
+    return min(np.linalg.norm(lab[:, None] - lab, axis=2)[np.triu_indices(len(lab), 1)].min() for lab in seen)
+
+
+def test_the_colour_blind_tell_curves_apart():
+    assert nearest_colours(plotting.PALETTE) > 10 > 5 > nearest_colours([f"C{k}" for k in range(6)])
+
+
+def test_curves_of_a_figure_differ_in_more_than_colour(run):
+    several = {name: run for name in ("one", "two", "three", "four", "five", "six", "seven")}
+    for axes in (*plotting.coefficients(several).axes, plotting.spectrum(several).axes[1], *run.plot_forces().axes):
+        drawn = [each for each in axes.lines if each.get_linestyle() == "-"]
+        assert len({each.get_marker() for each in drawn}) == len(drawn) > 2
+        assert all(0 < len(each.get_markevery()) <= 8 for each in drawn)
+    (alone,) = plotting.spectrum({"one": run}).axes[1].lines
+    assert alone.get_marker() == "None"
+
+
+@pytest.mark.parametrize("points", [0, 1, 2, 3, 1_000_000])
+def test_markers_of_any_number_of_points_lie_on_them(points):
+    for logarithmic in (False, True):
+        every = line(3, 5, points, logarithmic=logarithmic)["markevery"]
+        assert all(0 <= index < points for index in every) and (points == 0 or len(every))
+
+
+@pytest.mark.parametrize("name", plotting.FIELDS)
+def test_colours_of_fields_rise_evenly_and_those_of_signed_ones_from_the_middle(name):
+    """In lightness, as all eyes see it: jet does not."""
+    style = plotting.FIELDS[name]
+    lightness = as_seen(matplotlib.colormaps[style.colours](np.linspace(0, 1, 101))[:, :3], np.eye(3))[:, 0]
+    if style.signed:
+        assert lightness.argmax() == 50 and lightness[50] > 95
+        lightness = np.concatenate([lightness[:51], 200 - lightness[51:]])
+    assert np.diff(lightness).min() > -0.2

@@ -77,6 +77,14 @@ def at(snapshot: Snapshot, points: FloatArray, spacing: float, domain: Domain) -
     }
 
 
+def velocity_gradient(snapshot: Snapshot, points: FloatArray, spacing: float) -> FloatArray:
+    """Return the velocity gradient (m, d, d) of the fluid of a snapshot at points (m, d), those of buffers too."""
+    position, velocity = snapshot.position[snapshot.fluid], snapshot.velocity[snapshot.fluid]
+    if snapshot.domain:
+        position, velocity = with_images(position, velocity, snapshot.domain, REACH * spacing)
+    return interpolate_parts(position, velocity, points, spacing)[1]
+
+
 def with_images(
     position: FloatArray, fields: FloatArray, domain: Domain, reach: float
 ) -> tuple[FloatArray, FloatArray]:

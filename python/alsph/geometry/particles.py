@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from alsph.arrays import FloatArray
+from alsph.geometry.domain import Domain
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
@@ -43,6 +44,8 @@ class Snapshot:
         In U/D.
     kind : ndarray of uint8, shape (n,)
         See :class:`alsph.geometry.particles.Kind`.
+    domain : Domain, optional
+        The box that the flow is computed in, if it is known, with the sides that are periodic.
     """
 
     time: float
@@ -52,6 +55,7 @@ class Snapshot:
     velocity_divergence: FloatArray
     vorticity: FloatArray
     kind: NDArray[np.uint8]
+    domain: Domain | None = None
 
     @property
     def fluid(self) -> NDArray[np.bool_]:

@@ -78,7 +78,7 @@ def _pressure_over_chord(
             chosen = (surface.part == part) & (surface.side == side)
             mean, deviation = coefficient.mean[chosen], coefficient.deviation[chosen]
             number, label = (part, f"{of[part]}, {name}") if len(parts) > 1 else (index, name)
-            drawn = line(number, int(chosen.sum())) if len(parts) > 1 else {"color": PALETTE[number]}
+            drawn = line(number, len(parts), int(chosen.sum()))
             for axes, abscissa in ((left, chord), (right, surface.arc)):
                 axes.plot(abscissa[chosen], mean, style, label=label, **drawn)
                 band = mean - deviation, mean + deviation
@@ -118,7 +118,7 @@ def profile(curves: dict[str, Profile]) -> Figure:
     axes = figure.subplots()
     known: dict[str, tuple[int, str, Profile]] = {}
     for index, (name, curve) in enumerate(curves.items()):
-        axes.plot(*curve.computed, lw=1.2, label=name, **line(index, len(curve.computed[0])))
+        axes.plot(*curve.computed, lw=1.2, label=name, **line(index, len(curves), len(curve.computed[0])))
         if curve.reference[0].size:
             known.setdefault(str(np.array(curve.reference).tolist()), (index, name, curve))
     for index, name, curve in known.values():  # one for all, or that of each in its colour
@@ -205,7 +205,13 @@ def convergence(errors: dict[str, dict[int, float]]) -> Figure:
     figure = blank(7, 4.5)
     axes = figure.subplots()
     for number, (name, series) in enumerate(errors.items()):
-        axes.loglog([*series], np.abs([*series.values()]), label=name, **line(number, len(series)) | {"markevery": 1})
+        axes.loglog(
+            [*series],
+            np.abs([*series.values()]),
+            label=name,
+            color=PALETTE[number % len(PALETTE)],
+            marker=MARKERS[number % len(MARKERS)],
+        )
     resolutions = sorted({resolution for series in errors.values() for resolution in series})
     largest = max(abs(error) for series in errors.values() for error in series.values())
     for order, style in ((1, "k:"), (2, "k--")):

@@ -27,7 +27,7 @@ def forces(run: Run, body: str | None = None) -> Figure:
     for axes, axis, symbol in ((upper, "x", "C_D"), (lower, "y", "C_L")):
         parts = {part: run.coefficient(axis, part, body) for part in ("viscous", "pressure", "total")}
         for number, (part, values) in zip((2, 1, 0), parts.items(), strict=True):
-            axes.plot(time, values, lw=1, label=part, **line(number, len(time)))
+            axes.plot(time, values, lw=1, label=part, **line(number, 3, len(time)))
         if limits := robust_limits([(time, values) for values in parts.values()]):
             axes.set_ylim(limits)
         axes.set_ylabel(f"${symbol}$")
@@ -56,7 +56,10 @@ def coefficients(runs: dict[str, Run]) -> Figure:
     for axes, axis, symbol in ((upper, "x", "C_D"), (lower, "y", "C_L")):
         records = [(run.history["time"], run.coefficient(axis)) for run in runs.values()]
         for index, ((name, run), record) in enumerate(zip(runs.items(), records, strict=True)):
-            label, drawn = f"{name}, {DEVELOPING}" if run.window.developing else name, line(index, len(record[0]))
+            label, drawn = (
+                f"{name}, {DEVELOPING}" if run.window.developing else name,
+                line(index, len(runs), len(record[0])),
+            )
             axes.plot(*record, lw=1, label=label, **drawn)
             if run.window.edges.size:
                 span = [run.window.start, run.window.end]
@@ -90,7 +93,7 @@ def spectrum(runs: dict[str, Run], body: str | None = None) -> Figure:
             if window.edges.size:
                 lines = averages.amplitude_spectrum(time, coefficient, window.start, window.end)
                 label = f"{name}, {DEVELOPING}" if window.developing else name
-                drawn = line(number, len(lines[0]) - 1, logarithmic=True)
+                drawn = line(number, len(runs), len(lines[0]) - 1, logarithmic=True)
                 axes.loglog(*(a[1:] for a in lines), lw=0.8, label=label, **drawn)
         axes.set_ylabel(f"amplitude of ${symbol}$")
         axes.grid(alpha=0.3)
@@ -147,7 +150,7 @@ def ledger(run: Run) -> Figure:
     grid = figure.subplots(4, 2, sharex=True)
     for axes, (label, curves) in zip(grid.flat, panels, strict=True):
         for number, (name, values) in enumerate(curves.items()):
-            axes.plot(run.history["time"], values, lw=0.8, label=name, **line(number, len(values)))
+            axes.plot(run.history["time"], values, lw=0.8, label=name, **line(number, len(curves), len(values)))
         axes.set_ylabel(label)
         if not curves:
             _energy_budget(axes, run.ledger)

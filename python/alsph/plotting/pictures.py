@@ -202,9 +202,7 @@ def colour_limit(
 def _values(snapshot: Snapshot, name: str, whole: Snapshot, spacing: float) -> FloatArray:
     """Return a field at the fluid particles of a snapshot, which is a part of the whole one."""
     if name in DERIVED:
-        fluid, known = snapshot.position[snapshot.fluid], whole.fluid
-        gradient = sampling.interpolate_parts(whole.position[known], whole.velocity[known], fluid, spacing)[1]
-        return DERIVED[name](gradient)
+        return DERIVED[name](sampling.velocity_gradient(whole, snapshot.position[snapshot.fluid], spacing))
     values = np.linalg.norm(snapshot.velocity, axis=1) if name == "velocity" else getattr(snapshot, name)
     if name == "pressure" and _is_closed(snapshot):
         values = values - values[snapshot.fluid].mean()  # which means nothing, and would leave one colour

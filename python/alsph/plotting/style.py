@@ -28,22 +28,27 @@ MARKED = 8
 """Number of markers of a curve that has a point a step."""
 
 
-def line(number: int, points: int, *, logarithmic: bool = False) -> dict[str, Any]:
-    """Return how matplotlib is to draw one of several curves: its colour, and markers at some of its points.
+def line(number: int, of: int, points: int, *, logarithmic: bool = False) -> dict[str, Any]:
+    """Return how matplotlib is to draw a curve: its colour, and where it is one of several markers at some points.
 
     Parameters
     ----------
     number : int
         Number of the curve in the figure, from 0.
+    of : int
+        How many curves there are.
     points : int
         How many points it has.
     logarithmic : bool
         Whether they stand closer and closer on the abscissa.
     """
+    colour = {"color": PALETTE[number % len(PALETTE)]}
+    if of == 1:
+        return colour
     places = (np.arange(MARKED) + 0.5 + 0.15 * (number % 4)) / MARKED  # not on those of the next curve
     index = np.unique(points**places - 1 if logarithmic else (points - 1) * places).astype(int)
     marker = {"marker": MARKERS[number % len(MARKERS)], "ms": 4, "markevery": index[(index >= 0) & (index < points)]}
-    return {"color": PALETTE[number % len(PALETTE)], **marker}
+    return colour | marker
 
 
 def blank(width: float, height: float, layout: Literal["constrained", "compressed"] = "constrained") -> Figure:

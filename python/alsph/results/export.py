@@ -228,7 +228,7 @@ def grid(
     )
 
 
-def cloud(snapshot: Snapshot, spacing: float, domain: Domain, derived: Sequence[str] = ()) -> pyvista.PolyData:
+def cloud(snapshot: Snapshot, spacing: float, derived: Sequence[str] = ()) -> pyvista.PolyData:
     """Return the particles of a snapshot; see :meth:`alsph.Run.to_pyvista`."""
     for name in derived:
         choose("field", name, DERIVED)
@@ -238,7 +238,7 @@ def cloud(snapshot: Snapshot, spacing: float, domain: Domain, derived: Sequence[
     for name in ("pressure", "velocity_divergence", "vorticity", "kind"):
         found[name] = getattr(snapshot, name)
     if derived:
-        gradient = sampling.at(snapshot, snapshot.position, spacing, domain)["velocity_gradient"]
+        gradient = sampling.velocity_gradient(snapshot, snapshot.position, spacing)
         gradient[~snapshot.fluid] = np.nan
         for name in derived:
             found[name] = DERIVED[name](gradient)

@@ -71,7 +71,7 @@ class Fields:
         if len(self.times) == 0:
             raise RunFolderError(f"{self.path}: no snapshot yet; wait for the first one or lower output_interval")
         index = len(self.times) - 1 if time is None else int(np.abs(self.times - time).argmin())
-        return reading.snapshot(self.path / "particles.vtkhdf", index)
+        return reading.snapshot(self.path / "particles.vtkhdf", index, self.config.case.checked_domain)
 
     @cached_property
     def probes(self) -> Probes:
@@ -195,7 +195,7 @@ class Fields:
         ConfigError
             If pyvista is not installed (``pip install 'alsph[3d]'``), or there is no such field.
         """
-        return export.cloud(self.snapshot(time), self.spacing, self.config.case.checked_domain, derived)
+        return export.cloud(self.snapshot(time), self.spacing, derived)
 
     def momentum_balance(self, lower: tuple[float, ...], upper: tuple[float, ...]) -> FloatArray:
         """Mean force coefficients from the momentum balance of a box around the body: a check of the recorded loads.
