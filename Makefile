@@ -45,7 +45,7 @@ docs: $(EXTENSION) $(SPHINX)  ## The documentation site, in target/docs; a warni
 
 wheel: $(ENVIRONMENT)  ## A wheel for every Linux of this machine's kind with glibc 2.28 or later, in target/wheels.
 	$(BIN)/python -m pip install --quiet --group wheel
-	$(BIN)/maturin build --release --zig --compatibility manylinux_2_28
+	PATH="$(CURDIR)/$(BIN):$$PATH" maturin build --release --zig --compatibility manylinux_2_28  # which finds zig there
 
 bench:
 	cargo bench
