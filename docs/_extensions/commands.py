@@ -18,17 +18,21 @@ OF_A_CASE = (
 )
 
 
+OF_THE_CASE = ("Parameters of the problem", "Parameters of the method")
+
+
 def _plain(text: str) -> str:
     """Return a text that Markdown takes as it stands."""
     return re.sub(r"([\\`*_\[\]<>|$#])", r"\\\1", " ".join(text.split()))
 
 
-def _options(command: Any, context: Any, left_out: Any = ()) -> Iterator[str]:
-    """Yield a table of arguments and options."""
-    records = [each.get_help_record(context) for each in command.params if each.name not in left_out]
-    if any(records):
+def _options(command: Any, context: Any, *left_out: str) -> Iterator[str]:
+    """Yield a table of arguments and options, without those of some sections."""
+    sections = command.sections(context) if isinstance(command, Command) else {}
+    records = [record for section, found in sections.items() if section not in left_out for record in found]
+    if records:
         yield "\n| option | |\n|---|---|"
-        for names, text in filter(None, records):
+        for names, text in records:
             yield f"| `{names.replace('|', chr(92) + '|')}` | {_plain(text)} |"
 
 
@@ -40,7 +44,7 @@ def _described(name: str, command: Any, above: Any, level: int) -> Iterator[str]
     yield from (f"{_plain(paragraph)}\n" for paragraph in (command.help or "").split("\n\n"))
     if isinstance(command, CaseGroup):
         case = command.get_command(context, Cylinder.name)  # one stands for all
-        yield from _options(case, Context(case, info_name="CASE", parent=context), Cylinder.model_fields.keys())
+        yield from _options(case, Context(case, info_name="CASE", parent=context), *OF_THE_CASE)
         yield f"\n{OF_A_CASE}\n"
     else:
         yield from _options(command, context)

@@ -5,6 +5,7 @@ The options of ``run`` and ``describe`` are the fields of the case and of :class
 
 import signal
 from collections import UserDict
+from collections.abc import Iterator
 from importlib import import_module
 from typing import Annotated, Any
 
@@ -51,15 +52,15 @@ class Commands(CommandLine):
         super().__init__(**options)
         self.commands = Files(COMMANDS)
 
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the list of the commands."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+    def summaries(self, ctx: Any) -> Iterator[tuple[str, str]]:
+        """Yield the name of each command and what it does."""
+        return ((name, text) for name, (_, text) in COMMANDS.items())
 
 
 app = typer.Typer(
     cls=Commands,
     no_args_is_help=True,
+    subcommand_metavar="COMMAND [OPTIONS]",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     help="Incompressible flow with particles: augmented Lagrangian SPH.",

@@ -1,22 +1,23 @@
-"""The commands of a case, or of a file with one: run, describe, autotune and converge; and the list of the cases."""
+"""The commands of a case, or of a file with one: run, describe, autotune and converge; and the list of the cases.
+
+What does the work is imported where it is called, so that help comes at once.
+"""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+import alsph
 from alsph import cases
 from alsph.cli.app import COMMANDS
-from alsph.cli.options import Jobs, Retry, Scheduler, StudyOutput, Walltime, group_of_cases
-from alsph.cli.runs import say_run
-from alsph.cli.terminal import say, say_table
+from alsph.cli.common import Jobs, Retry, Scheduler, StudyOutput, Walltime
+from alsph.cli.help import App
+from alsph.cli.options import group_of_cases
+from alsph.cli.terminal import say, say_run, say_table
 from alsph.config import Config
 from alsph.errors import ConfigError
 from alsph.running.control import Control, seconds_of
-from alsph.running.describe import describe
-from alsph.running.start import start
-from alsph.study.autotune import autotune
-from alsph.study.convergence import converge
 
 
 def _run(
@@ -26,6 +27,8 @@ def _run(
     walltime: Walltime = None,
     retry: Retry = 0,
 ) -> None:
+    from alsph.running.start import start
+
     control = Control(walltime=seconds_of(walltime), retry=retry)
     say_run(start(configuration, output or Path("runs") / configuration.case.name, control, force=force))
 
@@ -34,6 +37,8 @@ def _describe(
     configuration: Config,
     probe: Annotated[bool, typer.Option(help="take a few steps to estimate the time")] = True,
 ) -> None:
+    from alsph.running.describe import describe
+
     say_table(describe(configuration, probe=probe))
 
 
@@ -49,7 +54,7 @@ def _autotune(
     ] = None,
 ) -> None:
     folder = output or Path("runs/autotune") / configuration.case.name
-    tuning = autotune(
+    tuning = alsph.autotune(
         configuration.case, divergence, develop=develop, probe=probe, margin=margin, threads=configuration.run.threads
     )
     tuning.save(folder)
@@ -68,12 +73,12 @@ def _converge(
     except ValueError:
         raise ConfigError(f"resolutions = {resolutions!r}: must be whole numbers with commas, as 10,14,20") from None
     threads = configuration.run.threads or 1
-    report = converge(configuration, ladder, output, jobs=jobs, threads=threads, scheduler=scheduler)
+    report = alsph.converge(configuration, ladder, output, jobs=jobs, threads=threads, scheduler=scheduler)
     say(f"\n{report}\n{report.path / 'convergence.md'}")
     raise typer.Exit(not report.results.complete)
 
 
-app = typer.Typer(add_completion=False, rich_markup_mode=None)
+app = App()
 EPILOG = "The options are the parameters of the case: see CASE --help. They override those of a file."
 for _name, _action in (("run", _run), ("describe", _describe), ("autotune", _autotune), ("converge", _converge)):
     app.add_typer(

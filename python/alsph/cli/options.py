@@ -5,15 +5,14 @@ import inspect
 import re
 import types
 from collections.abc import Callable, Iterable, Iterator
-from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import typer
-from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
 from alsph import cases, config
 from alsph.cases.method import Method
+from alsph.cli.help import App, Group
 from alsph.cli.terminal import exit_codes
 from alsph.config import RunSettings
 from alsph.errors import ConfigError
@@ -21,39 +20,15 @@ from alsph.parameters import Parameters, describe_default
 from alsph.text import shown
 from alsph.units import Units
 
-StudyName = Annotated[str, typer.Argument(metavar="NAME|FILE.toml", help="study: see alsph study list")]
-
-Preset = Annotated[str | None, typer.Option(help="preset of the study", show_default="its first")]
-
-StudyOutput = Annotated[Path, typer.Option("--output", "-o", help="folder for runs and results")]
-
-Jobs = Annotated[int | None, typer.Option(help="runs at a time", show_default="cores / threads")]
-
-Scheduler = Annotated[
-    str | None, typer.Option(help="address of a Dask scheduler, tcp://HOST:8786", show_default="local processes")
-]
-
-Walltime = Annotated[
-    str | None, typer.Option(metavar="HH:MM:SS", help="end with a checkpoint before this time", show_default="none")
-]
-
-Retry = Annotated[int, typer.Option(help="how often a run that breaks down goes back and on with half the time step")]
-
-Plane = Annotated[
-    str | None,
-    typer.Option(help="plane of the fields in 3-D, z=0.5 or y [D]", show_default="z, through the middle of the body"),
-]
-
-Threads = Annotated[int | None, typer.Option(help="number of threads", show_default="the run's")]
-
 WORDS = {int: "a whole number", float: "a number"}
 
 METAVARS: dict[Any, str] = {int: "INTEGER", float: "FLOAT", list[str]: "TEXT"}
 
+OWN_DEFAULT = "the case's own default"
+"""What the description of `until` says of it."""
+
 UNITS = {f"units_{name}" for name in Units.model_fields}
 """The entries of the table `units` as options."""
-
-RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="run folder")]
 
 
 def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Callable[..., None]:
@@ -68,7 +43,7 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
     try:
         until = f"{model().default_until:g}"
     except Exception:  # parameters that must be given
-        until = "the case's own"
+        until = OWN_DEFAULT
 
     @exit_codes()
     def command(context: typer.Context, **values: Any) -> None:
@@ -91,8 +66,8 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
         *keywords,
         *_options("Parameters of the problem", model, [name for name in names if name not in Method.model_fields]),
         *_options("Parameters of the method", model, [name for name in names if name in Method.model_fields]),
-        *_options("Units", Units, Units.model_fields, "units_", **dict.fromkeys(Units.model_fields, "not said")),
-        *_options("Settings of the run", RunSettings, RunSettings.model_fields, until=until, threads="all cores"),
+        *_options("Units, all four or none", Units, Units.model_fields, "units_", required=""),
+        *_options("Settings of the run", RunSettings, RunSettings.model_fields, until=until),
     ]
     functools.update_wrapper(command, action)
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
@@ -100,17 +75,22 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
     return command
 
 
-class CaseGroup(TyperGroup):
+class CaseGroup(Group):
     """Commands named after the cases; the name of a TOML file stands for the case in it, with its parameters.
 
     A case of the user's is FILE.py:CLASS.
     """
 
     action: Callable[..., None]
+    listed = "Cases"
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of the cases."""
         return list(cases.CASES)
+
+    def summaries(self, ctx: Any) -> Iterator[tuple[str, str]]:
+        """Yield the name of each case and what it is."""
+        return ((name, model.title) for name, model in cases.CASES.items())
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of a case, or of the case in a file."""
@@ -118,11 +98,9 @@ class CaseGroup(TyperGroup):
             if cmd_name.endswith(".toml"):
                 ctx.obj = config.load(cmd_name)
             model = type(ctx.obj.case) if ctx.obj else cases.find(cmd_name)
-            app = typer.Typer(add_completion=False, rich_markup_mode=None)
+            app = App()
             text = re.sub(r":\w+:`([^`]*)`", r"\1", (model.__doc__ or "").split("Parameters\n---")[0].strip())
-            app.command(model.name, cls=CaseCommand, help=text, short_help=model.title)(
-                _case_command(model, self.action)
-            )
+            app.command(model.name, help=text, short_help=model.title)(_case_command(model, self.action))
             return get_command(app)
         raise AssertionError("the block ends in one way or the other")
 
@@ -132,30 +110,22 @@ def group_of_cases(action: Callable[..., None]) -> type[CaseGroup]:
     return type("Cases", (CaseGroup,), {"action": staticmethod(action)})
 
 
-class CaseCommand(TyperCommand):
-    """A command whose help has its options in the sections that they name."""
-
-    def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write the options."""
-        sections: dict[str, list[Any]] = {}
-        for option in self.get_params(ctx):
-            if record := option.get_help_record(ctx):
-                sections.setdefault(getattr(option, "rich_help_panel", None) or "Options", []).append(record)
-        for name, records in sections.items():
-            with formatter.section(name):
-                formatter.write_dl(records)
-
-
 def _options(
-    section: str, model: type[Parameters], names: Iterable[str], prefix: str = "", **defaults: str
+    section: str,
+    model: type[Parameters],
+    names: Iterable[str],
+    prefix: str = "",
+    *,
+    until: str = OWN_DEFAULT,
+    required: str = "  [required]",
 ) -> Iterator[inspect.Parameter]:
-    """Make an option of each named field of a model; `defaults` says what stands for None."""
+    """Make an option of each named field of a model; `until` is when a run of the case ends."""
     for name in names:
         kind, choices = _option_type(model.model_fields[name].annotation)
         flag = f"--{prefix}{name}".replace("_", "-")
         option = typer.Option(
             f"{flag}/--no-{flag[2:]}" if kind is bool else flag,
-            help=f"{model.describe(name)}  [default: {defaults.get(name) or describe_default(model, name)}]",
+            help=model.describe(name).replace(OWN_DEFAULT, until) + _default(model, name, required),
             show_default=False,
             rich_help_panel=section,
             metavar="|".join(map(str, choices)) or METAVARS.get(kind),
@@ -167,6 +137,14 @@ def _options(
             default=None,
             annotation=Annotated[Union[kind, None], option],  # noqa: UP007
         )
+
+
+def _default(model: type[Parameters], name: str, required: str) -> str:
+    """Return what is told of a default; what holds where nothing is given is part of what a parameter means."""
+    field = model.model_fields[name]
+    if field.is_required():
+        return required
+    return "" if field.default is None else f"  [default: {describe_default(model, name)}]"
 
 
 def _option_type(annotation: Any) -> tuple[Any, tuple[Any, ...]]:

@@ -1,4 +1,7 @@
-"""The commands of a run folder: resume, repeat, info, watch, plot, animate and export."""
+"""The commands of a run folder: resume, repeat, info, watch, plot, animate and export.
+
+What does the work is imported where it is called, so that help comes at once.
+"""
 
 import functools
 import re
@@ -8,29 +11,20 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.progress import Progress
 
-from alsph import plotting
-from alsph.analysis.vortices import DERIVED
-from alsph.cases.source import shown_name
-from alsph.cli.options import Plane, Retry, RunPath, Threads, Walltime
-from alsph.cli.terminal import complain, exit_codes, say, say_table
+import alsph
+from alsph.cli.common import Plane, Retry, RunPath, Threads, Walltime
+from alsph.cli.help import App
+from alsph.cli.terminal import complain, exit_codes, say, say_run
 from alsph.errors import ConfigError, RunFolderError
-from alsph.folder.durable import check_folder
 from alsph.parameters import choose
-from alsph.results.export import FORMATS
-from alsph.results.run import Run
 from alsph.running.control import seconds_of
-from alsph.running.repetition import repeat
-from alsph.running.start import resume
 from alsph.tables import markdown
-from alsph.watching.server import watch
 
 KINDS = ("png", "pdf", "svg")
 """Formats of figures."""
 
-app = typer.Typer(add_completion=False, rich_markup_mode=None)
+app = App()
 
 
 @app.command("resume")
@@ -43,7 +37,7 @@ def _resume(
     retry: Retry = 0,
 ) -> None:
     """Go on with a run from its newest sound checkpoint; one that has reached its end stays as it is."""
-    say_run(resume(path, until, threads, walltime=seconds_of(walltime), retry=retry))
+    say_run(alsph.resume(path, until, threads, walltime=seconds_of(walltime), retry=retry))
 
 
 @app.command("repeat")
@@ -53,7 +47,7 @@ def _repeat(path: RunPath, threads: Threads = None) -> None:
 
     The exit code is 1 if it is not the same.
     """
-    repetition = repeat(path, threads)
+    repetition = alsph.repeat(path, threads)
     say(repetition)
     raise typer.Exit(not repetition.same)
 
@@ -62,7 +56,7 @@ def _repeat(path: RunPath, threads: Threads = None) -> None:
 @exit_codes()
 def _info(path: RunPath) -> None:
     """Tell the state and the results of a run."""
-    say_run(Run(path))
+    say_run(alsph.Run(path))
 
 
 @app.command("watch")
@@ -86,13 +80,13 @@ def _watch(
 
     then open http://localhost:8000.
     """
-    watch(path, port, browser=browser)
+    alsph.watch(path, port, browser=browser)
 
 
 @app.command("runs")
 @exit_codes()
 def _runs(
-    folder: Annotated[Path, typer.Argument(metavar="[FOLDER]", help="where to look, in folders of it, too")] = Path(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="where to look, in folders of it, too")] = Path(
         "runs"
     ),
 ) -> None:
@@ -107,9 +101,11 @@ def _runs(
 
 def _row(path: Path, above: Path) -> list[str]:
     """Return what is to be told of a run folder, or what is wrong with it."""
+    from alsph.cases.source import shown_name
+
     name = str(path.relative_to(above))
     try:
-        run = Run(path)
+        run = alsph.Run(path)
     except RunFolderError as error:
         return [name, "", "", "", str(error).removeprefix(f"{path}: "), "", "", ""]
     case = run.info.get("case", shown_name(run.case.get("case")))
@@ -129,8 +125,7 @@ def _plot(
     field: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="|".join(plotting.FIELDS),
-            help="field to draw, may be repeated",
+            help="field to draw: vorticity, pressure, velocity or velocity_divergence; may be repeated",
             show_default="vorticity and pressure",
         ),
     ] = None,
@@ -142,7 +137,6 @@ def _plot(
     kind: Annotated[str, typer.Option("--format", metavar="png|pdf|svg", help="format of the figures")] = "png",
     dpi: Annotated[int, typer.Option(min=10, max=2400, help="pixels an inch of png")] = 100,
     plane: Plane = None,
-    streamlines: Annotated[bool, typer.Option("--streamlines", help="draw streamlines over the fields")] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="folder for the figures", show_default="RUN/figures")
     ] = None,
@@ -152,14 +146,16 @@ def _plot(
     These are the ledger of the run, its curves beside their reference, forces and their spectra,
     pressure coefficient, and fields.
     """
+    from alsph.folder.durable import check_folder
+
     choose("format", kind, KINDS)
-    run = Run(path)
+    run = alsph.Run(path)
     names: list[Any] = field or ["vorticity", "pressure"]
     for name in names:
-        plotting.field_style(name)
+        alsph.plotting.field_style(name)
     figures = output or path / "figures"
     drawings = _drawings(run, body or []) | {
-        name: functools.partial(run.plot_field, name, time, plane=plane, streamlines=streamlines) for name in names
+        name: functools.partial(run.plot_field, name, time, plane=plane) for name in names
     }
     if not output:
         check_folder(figures)
@@ -167,11 +163,11 @@ def _plot(
     if time is not None and names:
         complain(f"fields at t* = {run.snapshot(time).time:.6g}, the output nearest to {time:g}")
     for name, draw in drawings.items():
-        plotting.save(draw(), figures / f"{name}.{kind}", dpi=dpi)
+        alsph.plotting.save(draw(), figures / f"{name}.{kind}", dpi=dpi)
         say(figures / f"{name}.{kind}")
 
 
-def _drawings(run: Run, bodies: list[str]) -> dict[str, Callable[[], Any]]:
+def _drawings(run: "alsph.Run", bodies: list[str]) -> dict[str, Callable[[], Any]]:
     """Return what draws the figures of a run but those of fields, by name; some of single bodies."""
     drawings: dict[str, Callable[[], Any]] = {
         profile.file_name: functools.partial(run.plot_profile, profile) for profile in run.profiles
@@ -195,7 +191,7 @@ def _drawings(run: Run, bodies: list[str]) -> dict[str, Callable[[], Any]]:
 @exit_codes()
 def _animate(
     path: RunPath,
-    field: Annotated[str, typer.Option(help="field to draw")] = "vorticity",
+    field: Annotated[str, typer.Option(help="field to draw, as of plot")] = "vorticity",
     start: Annotated[float | None, typer.Option(help="time to start at [D/U]", show_default="the first")] = None,
     end: Annotated[float | None, typer.Option(help="time to end at [D/U]", show_default="the last")] = None,
     every: Annotated[int, typer.Option(help="take one snapshot of so many")] = 1,
@@ -211,7 +207,10 @@ def _animate(
 
     A run writes a snapshot every output_interval. MP4 and WebM need pip install 'alsph[video]'.
     """
-    run = Run(path)
+    from rich.console import Console
+    from rich.progress import Progress
+
+    run = alsph.Run(path)
     name: Any = field
     times = {what: value for what, value in (("start", start), ("end", end)) if value is not None}
     console = Console(stderr=True)
@@ -229,12 +228,10 @@ def _animate(
 @exit_codes()
 def _export(
     path: RunPath,
-    to: Annotated[str | None, typer.Option(metavar="|".join(FORMATS), help="format", show_default="vtkhdf")] = None,
+    to: Annotated[str | None, typer.Option(metavar="vtkhdf|netcdf|csv", help="format", show_default="vtkhdf")] = None,
     time: Annotated[float | None, typer.Option(help="time of the fields [D/U]", show_default="the last")] = None,
-    spacing: Annotated[float | None, typer.Option(help="of the grid [D]", show_default="the particles'")] = None,
-    field: Annotated[
-        list[str] | None,
-        typer.Option(metavar="|".join(DERIVED), help="field to write, too, may be repeated", show_default="none"),
+    spacing: Annotated[
+        float | None, typer.Option(help="spacing of the grid [D]", show_default="the particles'")
     ] = None,
     output: Annotated[
         Path | None,
@@ -245,16 +242,13 @@ def _export(
 
     ParaView 5.12 or later reads vtkhdf; netcdf needs pip install 'alsph[tables]'. Bodies are NaN.
     """
+    from alsph.results.export import FORMATS
+
     if to is not None:
         choose("to", to, FORMATS)
     if output and to and output.suffix != FORMATS[to]:
         raise ConfigError(f"{output}: a file in the format {to} ends in {FORMATS[to]}")
-    grid = Run(path).to_grid(time, spacing, derived=field or [])
+    grid = alsph.Run(path).to_grid(time, spacing)
     if time is not None:
         complain(f"fields at t* = {grid.time:.6g}, the output nearest to {time:g}")
     say(grid.save(output or path / f"flow{FORMATS[to or 'vtkhdf']}"))
-
-
-def say_run(run: Run) -> None:
-    """Print the summary of a run."""
-    say_table([("run folder", str(run.path))] + [(name, str(value)) for name, value in run.summary().items()])

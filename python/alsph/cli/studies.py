@@ -1,26 +1,25 @@
-"""The commands of several runs: study and validate."""
+"""The commands of several runs: compare, study and validate.
+
+What does the work is imported where it is called, so that help comes at once.
+"""
 
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
-from alsph import study
-from alsph.cases.remarks import keywords, tally
-from alsph.cli.options import Jobs, Preset, Scheduler, StudyName, StudyOutput, Walltime
+import alsph
+from alsph.cli.common import Jobs, Preset, Scheduler, StudyName, StudyOutput, Walltime
+from alsph.cli.help import App, Group
 from alsph.cli.terminal import complain, exit_codes, say, say_table
 from alsph.running.control import seconds_of
-from alsph.study.board import overview
-from alsph.study.comparison import compare
-from alsph.study.validation import validate
 from alsph.text import printable
 
 LONGEST_NAME = 100
 """Letters of the folder of a comparison."""
 
 
-class StudyGroup(TyperGroup):
+class StudyGroup(Group):
     """``alsph study NAME`` stands for ``alsph study run NAME``."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -30,11 +29,11 @@ class StudyGroup(TyperGroup):
         return super().parse_args(ctx, args)
 
 
-app = typer.Typer(add_completion=False, rich_markup_mode=None)
-study_app = typer.Typer(
+app = App()
+study_app = App(
     cls=StudyGroup,
     no_args_is_help=True,
-    subcommand_metavar="NAME|FILE.toml [OPTIONS] | COMMAND",
+    subcommand_metavar="NAME|FILE.toml|COMMAND [OPTIONS]",
     help="Run a parameter study, draw its figures and write its tables.",
     epilog="alsph study NAME stands for alsph study run NAME. Start with: alsph study list",
 )
@@ -60,12 +59,12 @@ def _study_run(
     Runs are named by a hash of their configuration: those that have finished are used again, also by other studies,
     and those that were cut go on. The exit code is 1 if a run failed; one that diverged is a result.
     """
-    declared = study.load(name, preset)
+    declared = alsph.study.load(name, preset)
     if dry_run:
-        study.check_names(declared, declared.points())
+        alsph.study.check_names(declared, declared.points())
         _print_states(declared, output)
         return
-    results = study.run(
+    results = alsph.study.run(
         declared, output, jobs=jobs, threads=threads, scheduler=scheduler, walltime=seconds_of(walltime)
     )
     say(f"\n{results}")
@@ -77,15 +76,15 @@ def _study_run(
 @exit_codes()
 def _study_status(name: StudyName, preset: Preset = None, output: StudyOutput = Path("runs/studies")) -> None:
     """Tell how far the runs of a study are, whoever runs them."""
-    _print_states(study.load(name, preset), output)
+    _print_states(alsph.study.load(name, preset), output)
 
 
 @study_app.command("draw")
 @exit_codes()
 def _study_draw(name: StudyName, preset: Preset = None, output: StudyOutput = Path("runs/studies")) -> None:
     """Write tables and figures of the runs that there are, without running anything."""
-    declared = study.load(name, preset)
-    results = study.Results.of(declared, declared.points(), output)
+    declared = alsph.study.load(name, preset)
+    results = alsph.study.Results.of(declared, declared.points(), output)
     results.save()
     _print_results(results)
 
@@ -93,7 +92,7 @@ def _study_draw(name: StudyName, preset: Preset = None, output: StudyOutput = Pa
 @study_app.command("list")
 def _study_list() -> None:
     """List the studies that come with alsph."""
-    say_table([(name, study.load(name).title) for name in study.shipped()])
+    say_table([(name, alsph.study.load(name).title) for name in alsph.study.shipped()])
 
 
 @app.command("compare")
@@ -109,7 +108,7 @@ def _compare(
 
     Differences are those to the first run, with the ± of both added by squares.
     """
-    comparison = compare(paths)
+    comparison = alsph.compare(paths)
     name = "_".join(comparison.runs).replace("/", "_")
     say(f"{comparison}\n")
     for path in comparison.save(output or Path("runs/comparison") / name[:LONGEST_NAME]):
@@ -119,7 +118,7 @@ def _compare(
 @app.command("validate")
 @exit_codes()
 def _validate(
-    names: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="cases; all if none is given")] = None,
+    names: Annotated[list[str] | None, typer.Argument(metavar="CASE...", help="cases; all if none is given")] = None,
     full: Annotated[bool, typer.Option("--full/--quick", help="hours, or minutes, on two cores")] = False,
     resolution: Annotated[
         list[int] | None, typer.Option(help="resolution D/Δx, may be repeated", show_default="those of the suite")
@@ -134,20 +133,23 @@ def _validate(
     The exit code is 1 if a check fails. Runs are kept in the output folder and used again; a validation that was cut
     goes on when it is started again.
     """
-    report = validate(*(names or ()), full=full, resolutions=resolution or (), threads=threads, output=output)
+    report = alsph.validate(*(names or ()), full=full, resolutions=resolution or (), threads=threads, output=output)
     say(f"\n{report}\n{report.path / 'report.md'}")
     raise typer.Exit(not report.passed)
 
 
-def _print_results(results: study.Results) -> None:
+def _print_results(results: "alsph.study.Results") -> None:
     for warning in results.warnings:
         complain(f"warning: {warning}", "yellow")
     say(results.path / "results.md")
 
 
-def _print_states(declared: study.Study, output: Path) -> None:
+def _print_states(declared: "alsph.study.Study", output: Path) -> None:
+    from alsph.cases.remarks import keywords, tally
+    from alsph.study.board import overview
+
     points = declared.points()
-    for line in overview(points, study.states(points, output)):
+    for line in overview(points, alsph.study.states(points, output)):
         say(printable(line))
     if remarked := tally([keywords(point.config.case.remarks()) for point in points]):
         say(f"remarks: {remarked}")

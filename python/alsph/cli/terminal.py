@@ -6,13 +6,16 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
-from typer.core import TyperGroup
 
+from alsph.cli.help import Group
 from alsph.errors import AlsphError, Interrupted, WalltimeError
 from alsph.text import printable
+
+if TYPE_CHECKING:
+    from alsph import Run
 
 INTERRUPTED = 130
 BROKEN_PIPE = 141
@@ -51,13 +54,18 @@ def say_table(rows: list[tuple[str, str]]) -> None:
         say(printable(f"{name:{width}}  {value}"))
 
 
+def say_run(run: "Run") -> None:
+    """Print the summary of a run."""
+    say_table([("run folder", str(run.path))] + [(name, str(value)) for name, value in run.summary().items()])
+
+
 def complain(text: str, colour: str | None = None) -> None:
     """Print a line on stderr, if there is a terminal left to read it."""
     with suppress(OSError):
         typer.secho(printable(text), fg=colour, err=True)
 
 
-class CommandLine(TyperGroup):
+class CommandLine(Group):
     """The group of all commands."""
 
     def main(self, *arguments: Any, **options: Any) -> Any:

@@ -1,0 +1,33 @@
+"""Arguments and options that several commands have."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="run folder")]
+
+StudyName = Annotated[str, typer.Argument(metavar="NAME|FILE.toml", help="study: see alsph study list")]
+
+Preset = Annotated[str | None, typer.Option(help="preset of the study", show_default="its first")]
+
+StudyOutput = Annotated[Path, typer.Option("--output", "-o", help="folder for runs and results")]
+
+Jobs = Annotated[int | None, typer.Option(help="runs at a time", show_default="cores / threads")]
+
+Scheduler = Annotated[
+    str | None, typer.Option(help="address of a Dask scheduler, tcp://HOST:8786", show_default="local processes")
+]
+
+Walltime = Annotated[
+    str | None, typer.Option(metavar="HH:MM:SS", help="end with a checkpoint before this time", show_default="none")
+]
+
+Retry = Annotated[int, typer.Option(help="how often a run that breaks down goes back and on with half the time step")]
+
+Plane = Annotated[
+    str | None,
+    typer.Option(help="plane of the fields in 3-D, z=0.5 or y [D]", show_default="z, through the middle of the body"),
+]
+
+Threads = Annotated[int | None, typer.Option(help="number of threads", show_default="the run's")]
