@@ -6,6 +6,7 @@ from typing import Any
 
 from alsph.cases import Cylinder
 from alsph.cli import app
+from alsph.cli.help import Command
 from alsph.cli.options import CaseGroup
 from docutils.nodes import Node
 from sphinx.util.docutils import SphinxDirective

@@ -1,11 +1,13 @@
 """How commands tell of themselves, alike with every version of typer and within 80 columns."""
 
 import re
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
 
 import typer
 from typer.core import TyperCommand, TyperGroup
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 KINDS = {"str": "TEXT", "int": "INTEGER", "float": "FLOAT", "path": "PATH", "Path": "PATH"}
 """What stands for the value of an option, by the kinds that typer names."""
@@ -25,8 +27,10 @@ class Command(TyperCommand):
             if record := each.get_help_record(ctx):
                 argument = each.param_type_name == "argument"
                 section = getattr(each, "rich_help_panel", None) or ("Arguments" if argument else "Options")
-                names = _name(each) if argument else _plain_names(record[0])
-                found.setdefault(section, []).append((names, _plain_help(record[1])))
+                names, text = _plain_names(record[0]), _plain_help(record[1])
+                if argument:  # that it is required stands in the usage
+                    names, text = _name(each), text.removesuffix("[required]").strip()
+                found.setdefault(section, []).append((names, text))
         return found
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
@@ -63,7 +67,9 @@ class App(typer.Typer):
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"add_completion": False, "rich_markup_mode": None} | options)
 
-    def command(self, name: str | None = None, *, cls: type[TyperCommand] | None = Command, **options: Any) -> Any:
+    def command(
+        self, name: str | None = None, *, cls: type[TyperCommand] | None = Command, **options: Any
+    ) -> Callable[[Function], Function]:
         """Return a decorator that makes a function a command."""
         return super().command(name, cls=cls, **options)
 
@@ -82,5 +88,6 @@ def _plain_names(names: str) -> str:
 
 
 def _plain_help(text: str) -> str:
-    """Return the help of an option, a default in words without brackets of its own; usage shows what is required."""
-    return re.sub(r"\[default: \((.*)\)\]$", r"[default: \1]", text.removesuffix("[required]").strip())
+    """Return the help of an option, a default in words without brackets of its own."""
+    text = re.sub(r"(\d+)<=x<=(\d+)\]$", r"\1 to \2]", text.replace(r"\[", "["))
+    return re.sub(r"\[default: \((.*)\)\]$", r"[default: \1]", text)
