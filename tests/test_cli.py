@@ -2,9 +2,11 @@ import subprocess
 import sys
 
 import pytest
-from alsph import Units, config, open_run
+from alsph import Units, config, open_run, plotting
 from alsph.cases import CASES
+from alsph.cli import app, runs
 from alsph.cli.app import COMMANDS
+from alsph.results import export
 
 COMMAND = [sys.executable, "-c", "from alsph.cli import main; main()"]
 
@@ -57,14 +59,15 @@ def test_end_to_end(alsph, tmp_path, small_options):
     assert open_run(run).history["time"][-1] < 0.04
 
 
-LIBRARIES = ("numpy", "pydantic", "h5py", "shapely", "rich", "scipy", "matplotlib")
+LIBRARIES = ("numpy", "pydantic", "shapely", "h5py", "rich", "filelock", "scipy", "matplotlib")
 
 
 @pytest.mark.parametrize(
     ("program", "loaded"),
     [
         ("import alsph, alsph.cli", ()),
-        ("import alsph.cli.of_cases, alsph.cli.runs, alsph.cli.studies", LIBRARIES[:5]),
+        ("import alsph.cli.runs, alsph.cli.studies", LIBRARIES[:2]),
+        ("import alsph.cli.of_cases", LIBRARIES[:3]),
     ],
 )
 def test_what_is_not_used_is_not_loaded(program, loaded):
@@ -72,6 +75,34 @@ def test_what_is_not_used_is_not_loaded(program, loaded):
     program += f"; import sys; print([name for name in {LIBRARIES} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == str(list(loaded))
+
+
+@pytest.mark.parametrize(
+    ("line", "completed"),
+    [
+        ("alsph ru", ["run", "runs"]),
+        ("alsph run cyl", ["cylinder", "cylinder_pair"]),
+        ("alsph run cylinder --scheme ", ["alsph", "wcsph", "edac"]),
+        ("alsph run cylinder --algorithm m", ["midpoint"]),
+        ("alsph plot runs/a --field v", ["vorticity", "velocity", "velocity_divergence"]),
+        ("alsph plot runs/a --format p", ["png", "pdf"]),
+        ("alsph export runs/a --to ", ["vtkhdf", "netcdf", "csv"]),
+        ("alsph study run rey", ["reynolds"]),
+        ("alsph validate cav", ["cavity"]),
+        ("alsph info ru", []),  # a path, which the shell completes
+    ],
+)
+def test_shells_complete(monkeypatch, capsys, line, completed):
+    monkeypatch.setenv("_ALSPH_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", line)
+    monkeypatch.setenv("COMP_CWORD", str(len(line.split(" ")) - 1))
+    with pytest.raises(SystemExit):
+        app(prog_name="alsph")
+    assert capsys.readouterr().out.split() == completed
+
+
+def test_choices_are_those_that_there_are():
+    assert (*plotting.FIELDS,) == runs.FIELDS and (*export.FORMATS,) == runs.GRIDS
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -1,13 +1,29 @@
 """Arguments and options that several commands have."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+import alsph
+
+
+def one_of(*choices: object) -> dict[str, Any]:
+    """Return the settings of an option that takes one of some values, which its help names and shells complete."""
+    names = [str(choice) for choice in choices]
+    return {"metavar": "|".join(names), "autocompletion": lambda: names}
+
+
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="run folder")]
 
-StudyName = Annotated[str, typer.Argument(metavar="NAME|FILE.toml", help="study: see alsph study list")]
+StudyName = Annotated[
+    str,
+    typer.Argument(
+        metavar="NAME|FILE.toml",
+        help="study: see alsph study list",
+        autocompletion=lambda: list(alsph.study.shipped()),
+    ),
+]
 
 Preset = Annotated[str | None, typer.Option(help="preset of the study", show_default="its first")]
 

@@ -12,6 +12,7 @@ from typer.main import get_command
 
 from alsph import cases, config
 from alsph.cases.method import Method
+from alsph.cli.common import one_of
 from alsph.cli.help import App, Group
 from alsph.cli.terminal import exit_codes
 from alsph.config import RunSettings
@@ -128,8 +129,8 @@ def _options(
             help=model.describe(name).replace(OWN_DEFAULT, until) + _default(model, name, required),
             show_default=False,
             rich_help_panel=section,
-            metavar="|".join(map(str, choices)) or METAVARS.get(kind),
             parser=_choice_of(choices) if choices else _number_of(kind) if kind in WORDS else None,
+            **(one_of(*choices) if choices else {"metavar": METAVARS.get(kind)}),
         )
         yield inspect.Parameter(
             prefix + name,

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 import alsph
-from alsph.cli.common import Plane, Retry, RunPath, Threads, Walltime
+from alsph.cli.common import Plane, Retry, RunPath, Threads, Walltime, one_of
 from alsph.cli.help import App
 from alsph.cli.terminal import complain, exit_codes, say, say_run
 from alsph.errors import ConfigError, RunFolderError
@@ -23,6 +23,10 @@ from alsph.tables import markdown
 
 KINDS = ("png", "pdf", "svg")
 """Formats of figures."""
+
+FIELDS = ("vorticity", "pressure", "velocity", "velocity_divergence")
+GRIDS = ("vtkhdf", "netcdf", "csv")
+"""What alsph.plotting and alsph.results.export, which help need not wait for, know by these names."""
 
 app = App()
 
@@ -124,17 +128,14 @@ def _plot(
     path: RunPath,
     field: Annotated[
         list[str] | None,
-        typer.Option(
-            help="field to draw: vorticity, pressure, velocity or velocity_divergence; may be repeated",
-            show_default="vorticity and pressure",
-        ),
+        typer.Option(help="field to draw, may be repeated", show_default="vorticity and pressure", **one_of(*FIELDS)),
     ] = None,
     time: Annotated[float | None, typer.Option(help="time of the fields [D/U]", show_default="the last")] = None,
     body: Annotated[
         list[str] | None,
         typer.Option(help="body to draw forces and pressure coefficient of by itself, too, may be repeated"),
     ] = None,
-    kind: Annotated[str, typer.Option("--format", metavar="png|pdf|svg", help="format of the figures")] = "png",
+    kind: Annotated[str, typer.Option("--format", help="format of the figures", **one_of(*KINDS))] = "png",
     dpi: Annotated[int, typer.Option(min=10, max=2400, help="pixels an inch of png")] = 100,
     plane: Plane = None,
     output: Annotated[
@@ -191,7 +192,7 @@ def _drawings(run: "alsph.Run", bodies: list[str]) -> dict[str, Callable[[], Any
 @exit_codes()
 def _animate(
     path: RunPath,
-    field: Annotated[str, typer.Option(help="field to draw, as of plot")] = "vorticity",
+    field: Annotated[str, typer.Option(help="field to draw", **one_of(*FIELDS))] = "vorticity",
     start: Annotated[float | None, typer.Option(help="time to start at [D/U]", show_default="the first")] = None,
     end: Annotated[float | None, typer.Option(help="time to end at [D/U]", show_default="the last")] = None,
     every: Annotated[int, typer.Option(help="take one snapshot of so many")] = 1,
@@ -228,7 +229,7 @@ def _animate(
 @exit_codes()
 def _export(
     path: RunPath,
-    to: Annotated[str | None, typer.Option(metavar="vtkhdf|netcdf|csv", help="format", show_default="vtkhdf")] = None,
+    to: Annotated[str | None, typer.Option(help="format", show_default="vtkhdf", **one_of(*GRIDS))] = None,
     time: Annotated[float | None, typer.Option(help="time of the fields [D/U]", show_default="the last")] = None,
     spacing: Annotated[
         float | None, typer.Option(help="spacing of the grid [D]", show_default="the particles'")

@@ -118,7 +118,12 @@ def _compare(
 @app.command("validate")
 @exit_codes()
 def _validate(
-    names: Annotated[list[str] | None, typer.Argument(metavar="CASE...", help="cases; all if none is given")] = None,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="CASE...", help="cases; all if none is given", autocompletion=lambda: list(alsph.cases.CASES)
+        ),
+    ] = None,
     full: Annotated[bool, typer.Option("--full/--quick", help="hours, or minutes, on two cores")] = False,
     resolution: Annotated[
         list[int] | None, typer.Option(help="resolution D/Δx, may be repeated", show_default="those of the suite")
