@@ -25,6 +25,11 @@ def rows(points, form="{:.6f} {:.6f}"):
     return "".join(form.format(*point) + "\n" for point in points)
 
 
+def rings(*radii):
+    angle = np.linspace(0, 2 * np.pi, 7)[:-1]
+    return "999 999\n".join(rows(radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)) for radius in radii)
+
+
 def read(folder: Path, content: str | bytes) -> Outline:
     path = folder / "foil.txt"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
@@ -180,9 +185,10 @@ def test_bodies_have_forces_of_their_own_that_add_up(tmp_path):
         ("<svg><path d='" + 300 * "M0 0L1 0" + "'/></svg>", r"foil\.txt:1: a line of .* characters"),
         (b"\x89PNG\r\n\x1a\n\0\0", r"foil\.txt: not a text file"),
         (b"\xff\xfe" + SQUARE.encode(), r"foil\.txt: (not a text file|holds no points)"),
-        (SQUARE + "\n0 0\n1 0\n1 1\n0 1\n0 0\n", r"foil\.txt: bodies 1 and 2 overlap at"),
-        (SQUARE + "\n0.5 -0.5\n1 -0.5\n1 0.5\n0.5 0.5\n0.5 -0.5\n", r"foil\.txt: bodies 1 and 2 touch at \(0.5, "),
-        (SQUARE + "999 999\n0 0\n.1 0\n0 .1\n", r"foil\.txt: body 2 lies within body 1"),
+        (SQUARE + "\n0 0\n1 0\n1 1\n0 1\n0 0\n", r"foil\.txt: curves 1 and 2 overlap at"),
+        (SQUARE + "\n0.5 -0.5\n1 -0.5\n1 0.5\n0.5 0.5\n0.5 -0.5\n", r"foil\.txt: curves 1 and 2 touch at \(0.5, "),
+        (SQUARE + "999 999\n0 0\n.5 0\n0 .1\n", r"foil\.txt: curves 1 and 2 touch at \(0.5, 0\)"),
+        (rings(*range(1, 13)), r"foil\.txt: curve 1 lies within more than 10 others"),
         ("0 0\n3 0\n3 3\n0 3\n0 0\n1 1\n1 2\n2 2\n2 1\n1 1\n", r"foil\.txt:1: .*meets itself .*a hole"),
     ],
 )
@@ -231,9 +237,10 @@ def test_no_folder_device_pipe_or_giant_is_read(tmp_path):
         ("".join(f"{k % 2} {k % 3}\n" for k in range(19_000)), "the curve meets itself"),
         ("".join(f"{k % 2} {k % 3}\n" for k in range(200_000)), "has 200,001 lines"),
         ("".join(f"0 0\n{k} 0\n{k} 5\n0 0\n\n" for k in range(1, 3000)), "overlap"),
+        (rings(*range(3500, 0, -1)), "curve 12 lies within more than 10 others"),
         ("".join(f"{k} 0\n" for k in range(25_000)), "holds 25,000 points"),
     ],
-    ids=["random", "zigzag", "long", "bodies", "many"],
+    ids=["random", "zigzag", "long", "bodies", "nested", "many"],
 )
 def test_what_takes_long_to_sort_out_is_refused_soon(content, problem, tmp_path):
     start = clock.monotonic()
@@ -365,10 +372,10 @@ def test_shapes_made_in_python_are_bodies_that_run_resume_and_repeat(tmp_path):
         (ELLIPSE[:2], 'points:1: "0.5 0.0": begins a curve of too few points'),
         (ELLIPSE * [1, np.nan], "coordinates must be finite"),
         (np.zeros((20_001, 2)), "has more than 20000 points"),
-        ([ELLIPSE, ELLIPSE], "body 1 lies within body 2"),
+        ([ELLIPSE, ELLIPSE], "curves 1 and 2 overlap"),
         ([[0, 0], [1, 1], [1, 0], [0, 1]], "the curve meets itself"),
-        (shapely.Point(0, 0), "must be of polygons without holes, not Point"),
-        (shapely.Polygon(ELLIPSE, [ELLIPSE / 2]), "must be of polygons without holes"),
+        (shapely.Point(0, 0), "must be of polygons, not Point"),
+        (shapely.Polygon(ELLIPSE, [ELLIPSE + [1.5, 0]]), "curves 1 and 2"),
     ],
 )
 def test_what_is_no_shape_is_refused(shape, problem):

@@ -143,7 +143,12 @@ def interpolate_parts(
 
 
 def late_velocity(run: Record, points: FloatArray, share: float = 0.25) -> FloatArray:
-    """Fluid velocities (m, d) at points, averaged over the snapshots in the last `share` of the run; NaN without any.
+    """Fluid velocities (m, d) at points, as :func:`late_fields` has them."""
+    return late_fields(run, points, share)[0][:, :-1]
+
+
+def late_fields(run: Record, points: FloatArray, share: float = 0.25) -> tuple[FloatArray, FloatArray]:
+    """Fluid velocity and pressure at points, averaged over the snapshots in the last `share` of the run; NaN without.
 
     Parameters
     ----------
@@ -152,12 +157,23 @@ def late_velocity(run: Record, points: FloatArray, share: float = 0.25) -> Float
         Points in the fluid [D].
     share : float
         Share of the time reached.
+
+    Returns
+    -------
+    values : ndarray, shape (m, d + 1)
+        The components of the velocity, and the pressure.
+    gradients : ndarray, shape (m, d + 1, d)
+        Derivative of field k along direction l at [:, k, l].
     """
-    total, late = np.zeros_like(points), run.times[run.times >= (1 - share) * run.times[-1:]]
+    m, d = points.shape
+    values, gradients = np.zeros((m, d + 1)), np.zeros((m, d + 1, d))
+    late = run.times[run.times >= (1 - share) * run.times[-1:]]
     for snapshot in map(run.snapshot, late):
-        position, velocity = snapshot.position[snapshot.fluid], snapshot.velocity[snapshot.fluid]
-        total += interpolate(position, velocity, points, run.spacing)[0]
-    return total / len(late) if len(late) else np.full_like(points, np.nan)
+        fields = np.column_stack([snapshot.velocity, snapshot.pressure])[snapshot.fluid]
+        found = interpolate(snapshot.position[snapshot.fluid], fields, points, run.spacing)
+        values, gradients = values + found[0], gradients + found[1]
+    count = len(late) or np.nan
+    return values / count, gradients / count
 
 
 def initial_state(state: dict[str, Any], run: Record, *, outlet: bool = True) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from typing import Any
 from alsph.cases import source
 from alsph.cases.backward_facing_step import BackwardFacingStep
 from alsph.cases.base import Case
+from alsph.cases.bend import Bend
 from alsph.cases.bodies import Bodies
 from alsph.cases.body import Body
 from alsph.cases.body_3d import Body3D
@@ -32,6 +33,7 @@ from alsph.cases.pressure_jump import PressureJump
 from alsph.cases.pulsating_channel import PulsatingChannel
 from alsph.cases.spatial import Spatial
 from alsph.cases.sphere import Sphere
+from alsph.cases.taylor_couette import TaylorCouette
 from alsph.cases.taylor_green import TaylorGreen
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain, SolidBody
@@ -40,14 +42,15 @@ from alsph.parameters import suggest
 CASES: dict[str, type[Case]] = {
     case.name: case
     for case in (
-        *(Cylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Nozzle, Cavity),
-        *(Poiseuille, Couette, PulsatingChannel, Pipe, PressureJump, TaylorGreen),
+        *(Cylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Nozzle, Bend, Cavity),
+        *(Poiseuille, Couette, TaylorCouette, PulsatingChannel, Pipe, PressureJump, TaylorGreen),
     )
 }
 
 __all__ = [
     "CASES",
     "BackwardFacingStep",
+    "Bend",
     "Bodies",
     "Body",
     "Body3D",
@@ -66,6 +69,7 @@ __all__ = [
     "SolidBody",
     "Spatial",
     "Sphere",
+    "TaylorCouette",
     "TaylorGreen",
     "find",
 ]

@@ -17,19 +17,20 @@ from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.channel import Channel
 from alsph.errors import ConfigError
+from alsph.geometry.lattice import inside
 from alsph.geometry.outline import Outline
-from alsph.geometry.packing import Planar, pack
+from alsph.geometry.packing import pack_around
 from alsph.geometry.solids import Solid
 from alsph.geometry.surface import Surface, along
-from alsph.geometry.thin import carried, solids
+from alsph.geometry.thin import carried, pockets, solids
 
 
 class Bodies(Channel):
     """Flow past bodies of any shape in a channel with free-slip walls and uniform inflow U.
 
     The solid particles follow the surfaces. What is thinner than 2 Δx, such as a sharp trailing edge, is cut off
-    (:attr:`carried`); a body of which that leaves less than half is refused. Forces are formed with D, and are those
-    of all bodies together as well as of each.
+    (:attr:`carried`); a body of which that leaves less than half is refused. Holes of 4 Δx and more are filled with
+    fluid, at rest at first. Forces are formed with D, and are those of all bodies together as well as of each.
     """
 
     body_name: ClassVar[str] = "body"
@@ -114,7 +115,13 @@ class Bodies(Channel):
         """Return fluid evenly spaced around the bodies, as much as they leave of the cells."""
         position = np.concatenate([solid.position for solid in self._solids])
         bodies = shapely.union_all(self.carried)
-        return np.asarray(self.centre + pack(cells - self.centre, Planar(bodies), position, self.particle_spacing))
+        return np.asarray(self.centre + pack_around(cells - self.centre, bodies, position, self.particle_spacing))
+
+    def _initial_velocity(self, position: FloatArray) -> FloatArray:
+        """Return the velocity (n, 2) at the start: none in holes."""
+        holes = pockets(shapely.union_all(self.carried))
+        enclosed = inside(shapely.union_all(holes), position - self.centre)
+        return np.where(enclosed[:, None], 0.0, super()._initial_velocity(position))
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -147,7 +154,8 @@ class Bodies(Channel):
             for remark in remarks.thin(name, outline, left, self.particle_spacing)
         ]
         near = remarks.gaps(self.coefficient_bodies, self.carried, self.particle_spacing)
-        return [*super().remarks(), *thin, *near, *remarks.unknown(len(self.outlines) > 1)]
+        pockets = remarks.holes(self.outlines, self.carried)
+        return [*super().remarks(), *thin, *near, *pockets, *remarks.unknown(len(self.outlines) > 1)]
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces on all bodies together, the Strouhal number, and the mean forces on each of several."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import shapely
@@ -18,6 +18,7 @@ from alsph.cases.bodies import Bodies
 from alsph.geometry.naca import NAME, naca
 from alsph.geometry.outline import Outline
 from alsph.geometry.surface import Surface, along, edges
+from alsph.geometry.thin import filled
 
 
 class Body(Bodies):
@@ -25,22 +26,26 @@ class Body(Bodies):
 
     D is the side of the square, the chord of the airfoil, the unit of the file's lengths, or the larger extent of a
     drawing; `scale` multiplies them. A file holds points, two numbers a line, in any of the usual orders and forms, or
-    is a drawing (SVG, DXF, GeoJSON); several closed curves are several bodies. The centroid, that
-    of all of them together, lies at (upstream, 0). The solid particles follow the surface. What is thinner than 2 Δx,
-    such as a sharp trailing edge, is cut off (:attr:`carried`); a body of which that leaves less than half is refused.
+    is a drawing (SVG, DXF, GeoJSON); several closed curves are several bodies, and one within another is a hole, which
+    fluid fills. The centroid, that of all of them together, lies at (upstream, 0). The solid particles follow the
+    surface. What is thinner than 2 Δx, such as a sharp trailing edge, is cut off (:attr:`carried`), and holes narrower
+    than 4 Δx are filled; a body of which less than half is left is refused.
     Forces are formed with D; moments with the chord c, the body's extent along x before it is turned, about c/4.
     """
 
     name: ClassVar[str] = "body"
     title: ClassVar[str] = "flow past a body of any shape in a channel"
     body_name: ClassVar[str] = "body"
-    made_for: ClassVar[tuple[str, ...]] = ("shape", "scale", "angle_of_attack")
+    made_for: ClassVar[tuple[str, ...]] = ("shape", "holes", "scale", "angle_of_attack")
 
     shape: str | Outline = Field(
         default="square_cylinder",
         description="square_cylinder, a NACA airfoil of four or five digits, such as naca0012, a text file of "
         "points: one or several closed curves, lengths in D; a drawing (.svg, .dxf, .geojson), its larger extent D; "
         "in Python also arrays of points or shapely's polygons",
+    )
+    holes: Literal["fluid", "solid"] = Field(
+        default="fluid", description="what fills holes in the shape: fluid, closed off from the flow, or solid"
     )
     scale: float | None = Field(
         default=None, gt=0, description="factor by which the lengths of the shape are multiplied; none: 1 [-]"
@@ -71,6 +76,8 @@ class Body(Bodies):
         """The body, or all bodies together, their centroid at the origin, turned by the angle of attack."""
         polygons = [named(self.shape)] if isinstance(self.shape, str) else self.shape.polygons
         outline = polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
+        if self.holes == "solid":
+            outline = filled(outline)
         if self.scale is not None:
             outline = affinity.scale(outline, self.scale, self.scale, origin=(0, 0))
         centred = affinity.translate(outline, -outline.centroid.x, -outline.centroid.y)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from alsph.arrays import FloatArray
@@ -19,18 +19,13 @@ from alsph.geometry.solids import walls
 
 
 class Duct(Case):
-    """Flow along x through a channel with no-slip walls, from an inlet at x = -upstream to an outlet.
+    """Flow through a channel with no-slip walls, from an inlet at x = -upstream to an outlet.
 
     Each subclass says what the channel is, a polygon, and the developed flow that it begins with.
     """
 
     upstream: float = Field(default=5.0, gt=0, description="length of the inlet channel [D]")
     downstream: float = Field(default=20.0, gt=0, description="length of the outlet channel [D]")
-
-    @property
-    def outlet(self) -> float:
-        """Where the outlet lies, x [D]."""
-        return self.downstream
 
     @abstractmethod
     def channel(self, end: float = 0.0) -> shapely.Polygon:
@@ -41,7 +36,7 @@ class Duct(Case):
         """Return the velocities (n, 2) at the start, and those of the inlet for good, at positions (n, 2)."""
 
     def domain(self) -> Domain:
-        """Return the bounds of the channel: inlet and outlet; solid particles close the rest."""
+        """Return the bounds of the channel: inlet and outlet, here along x; solid particles close the rest."""
         left, bottom, right, top = self.channel().bounds
         return Domain((left, bottom), (right, top), [("inlet", "outlet"), ("none", "none")])
 
@@ -62,8 +57,9 @@ class Duct(Case):
     def particle_estimate(self) -> int:
         """Return about how many particles there are, solid and buffers included."""
         channel, depth = self.channel(self._end), self.support_layers * self.particle_spacing
-        left, bottom, right, top = channel.bounds
-        solid = channel.buffer(depth).intersection(shapely.box(left, bottom - depth, right, top + depth)) - channel
+        closed = [[side == "none" for side in sides] for sides in self.checked_domain.boundaries]
+        (left, right), (bottom, top) = depth * np.array(closed) * (-1, 1) + np.reshape(channel.bounds, (2, 2)).T
+        solid = channel.buffer(depth).intersection(shapely.box(left, bottom, right, top)) - channel
         return round(float(self.channel(self._buffer).area + solid.area) / self.particle_spacing**2)
 
     def particles(self) -> dict[str, NDArray[Any]]:
@@ -71,19 +67,27 @@ class Duct(Case):
         spacing, buffer = self.particle_spacing, self._buffer
         channel = self.channel(self._end)
         solid = walls(channel, spacing, self.support_layers)
-        x = solid.position[:, 0]
         points = cells(channel, spacing)
         points = points[inside(channel, points)]
-        before, behind = -self.upstream - points[:, 0], points[:, 0] - self.outlet
+        before, behind = self._beyond(points)
         groups = {
             Kind.FLUID: (before < 0) & (behind < 0),
             Kind.INLET: (before > 0) & (before < buffer),
             Kind.OUTLET: (behind > 0) & (behind < buffer),
         }
+        solid = solid.where(np.max(self._beyond(solid.position), axis=0) < self._end)
         return join(
             *(particles(kind, points[chosen], self.developed(points[chosen])) for kind, chosen in groups.items()),
-            solid.where((x > -self.upstream - self._end) & (x < self.outlet + self._end)).particles(),
+            solid.particles(body=self.wall(solid.position)),
         )
+
+    def wall(self, position: FloatArray) -> ArrayLike:
+        """Return which of :meth:`bodies` the solid particles at positions (n, 2) belong to, by its place there."""
+        return 0
+
+    def _beyond(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return how far points (n, 2) lie beyond the inlet and beyond the outlet [D]."""
+        return self.checked_domain.beyond("inlet", points), self.checked_domain.beyond("outlet", points)
 
 
 def parabola(share: FloatArray, mean: FloatArray) -> FloatArray:

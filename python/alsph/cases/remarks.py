@@ -13,7 +13,8 @@ from collections.abc import Iterable, Sequence
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from alsph.geometry.thin import THINNEST, carried, thickness
+from alsph.geometry import thin as thin_bodies
+from alsph.geometry.thin import NARROWEST_HOLE, THINNEST, carried, thickness
 from alsph.geometry.volume import Volume
 
 LAYER = 1.2
@@ -308,4 +309,17 @@ def gaps(names: list[str], bodies: list[Polygon | MultiPolygon], spacing: float)
             through = "nothing flows there" if gap < 1 else "the flow there is not resolved"
             pair = f"{gap:.2g} Δx between {names[first]} and {names[second]}"
             found.append(f"narrow gap: {pair}; {through}, use a finer resolution")
+    return found
+
+
+def holes(shapes: Sequence[Polygon], left: Sequence[Polygon | MultiPolygon]) -> list[str]:
+    """Remark on holes in bodies: on those of what is carried of them, and on those that are filled."""
+    drawn, carried = (sum(len(thin_bodies.holes(shape)) for shape in some) for some in (shapes, left))
+    found = []
+    if carried:
+        text = f"{carried} of fluid that no flow comes to; the pressure there has a level of its own"
+        found.append(f"closed holes: {text}")
+    if drawn > carried:
+        text = f"{drawn - carried} of {drawn} are narrower than {NARROWEST_HOLE:g} Δx, or opened where the body is thin"
+        found.append(f"lost holes: {text}; they come back with resolution")
     return found

@@ -93,6 +93,15 @@ class Domain:
                 if side == "inlet":
                     yield axis, sign, plane
 
+    def beyond(self, kind: Boundary, points: FloatArray) -> FloatArray:
+        """Return how far points (m, d) lie beyond sides of that kind (m,), negative inside; -inf without any [D]."""
+        found = np.full(len(points), -np.inf)
+        for axis, sides in enumerate(self.boundaries):
+            for side, sign, plane in zip(sides, (1, -1), (self.lower[axis], self.upper[axis]), strict=True):
+                if side == kind:
+                    found = np.maximum(found, sign * (plane - points[:, axis]))
+        return found
+
     def contains(self, points: FloatArray, margin: float = 0.0) -> NDArray[np.bool_]:
         """Return which of the points (m, d) lie in it, or at most `margin` beyond it [D]."""
         inside = (points >= np.array(self.lower) - margin) & (points <= np.array(self.upper) + margin)

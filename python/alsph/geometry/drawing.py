@@ -1,4 +1,7 @@
-"""Outlines from drawings: the closed curves of SVG, DXF and GeoJSON files, of which the larger extent becomes D."""
+"""Outlines from drawings: the closed curves of SVG, DXF and GeoJSON files, of which the larger extent becomes D.
+
+Curves within curves are holes in them, by the even-odd rule, whatever a drawing says of its filling.
+"""
 
 import io
 from collections import Counter
@@ -37,7 +40,7 @@ def is_drawing(path: Path) -> bool:
 
 
 def read(path: Path) -> tuple[list[shapely.Polygon], str]:
-    """Return the bodies of a drawing, its larger extent 1, y upwards, and what is to be said of it.
+    """Return what the curves of a drawing go around, its larger extent 1, y upwards, and what is to be said of it.
 
     Raises
     ------
@@ -86,7 +89,7 @@ def _closed(curves: list[FloatArray], back: Callable[[FloatArray], FloatArray], 
         if not loose.is_empty:
             x, y = back(shapely.get_coordinates(loose)[0])
             raise ConfigError(f"{name}: a curve is not closed, it ends at ({x:.6g}, {y:.6g}); close it, or take it out")
-    return [*closed, *shapely.get_parts(found)]
+    return [*closed, *(shapely.Polygon(part.exterior) for part in shapely.get_parts(found))]
 
 
 def _svg(content: bytes) -> Found:

@@ -3,7 +3,8 @@
 A line is a point, two numbers, or it is blank, a comment (``#``, ``%``, ``!``, ``//``), a title or note, whose first
 word is no number, a count of points, or it is refused by its number. Blank lines, titles and lines ``999 999`` divide
 the points into parts. Which parts make a curve, the shortest edges that close them decide: each part by itself (several
-bodies), upper and lower side from the leading edge on (Lednicer's order), or one after the other.
+bodies), upper and lower side from the leading edge on (Lednicer's order), or one after the other. A curve that lies
+within a body is a hole in it, and one within a hole a body again.
 """
 
 import math
@@ -31,6 +32,8 @@ LARGEST_FILE = 2**20
 """Size of the largest file that is read [bytes]; outlines have some kilobytes."""
 MOST_POINTS, MOST_REPAIRED = 20_000, 2000
 """Most points of a file, and of a curve that meets itself somewhere."""
+DEEPEST = 10
+"""Most curves that one may lie within."""
 LARGEST_NUMBER = 1e6
 """Coordinates beyond it are no lengths in D."""
 LONGEST_LINE = 1000
@@ -93,7 +96,7 @@ class Outline(Shape):
 
     FORMS: ClassVar[str] = "must be points (n, 2) of a closed curve, a list of such arrays, or shapely's polygons"
 
-    points: str = Field(description="a point a line, x and y [D], and a blank line between two bodies")
+    points: str = Field(description="a point a line, x and y [D], and a blank line between two curves")
     remark: str = Field(default="", description="what was left out")
 
     @classmethod
@@ -159,27 +162,41 @@ class Outline(Shape):
     def _sound(self) -> Self:
         if self.sha256 != sha256(self.points):
             raise ValueError(f"{self.file}: the points are not those that their sha256 is of")
-        polygons = self.polygons
-        for number, polygon in enumerate(polygons, 1):
-            if not polygon.is_valid or not polygon.area > 0:
-                raise ValueError(f"{self.file}: body {number} is no simple closed curve")
-        _check_apart(polygons, self.file)
+        curves = self.curves
+        for number, curve in enumerate(curves, 1):
+            if not curve.is_valid or not curve.area > 0:
+                raise ValueError(f"{self.file}: curve {number} is no simple closed curve")
+        _check_apart(curves, self.file)
         return self
 
     @cached_property
-    def polygons(self) -> list[shapely.Polygon]:
-        """The bodies in the order and the coordinates of the file [D]."""
+    def curves(self) -> list[shapely.Polygon]:
+        """What each curve goes around, in the order and the coordinates of the file [D]."""
         try:
             blocks = [block.splitlines() for block in self.points.rstrip("\n").split("\n\n")]
             return [shapely.Polygon([[float(word) for word in line.split()] for line in block]) for block in blocks]
         except (ValueError, TypeError):
-            raise ValueError(f"{self.file}: its points are not two numbers a line, three or more a body") from None
+            raise ValueError(f"{self.file}: its points are not two numbers a line, three or more a curve") from None
+
+    @cached_property
+    def polygons(self) -> list[shapely.Polygon]:
+        """The bodies with their holes, in the order and the coordinates of the file [D]."""
+        curves = self.curves
+        inner, outer = shapely.STRtree(curves).query(curves, predicate="within")
+        depth = np.bincount(inner)  # each lies in itself, too
+        holes: dict[int, list[shapely.LinearRing]] = {body: [] for body in np.flatnonzero(depth % 2 == 1).tolist()}
+        for hole, body in zip(inner.tolist(), outer.tolist(), strict=True):
+            if body in holes and depth[hole] == depth[body] + 1:
+                holes[body].append(curves[hole].exterior)
+        return [shapely.Polygon(curves[body].exterior, rings) for body, rings in holes.items()]
 
     def __str__(self) -> str:
         """Name the file and tell what was found in it."""
         counts = ", ".join(str(len(polygon.exterior.coords) - 1) for polygon in self.polygons)
         bodies = "a body" if len(self.polygons) == 1 else f"{len(self.polygons)} bodies"
-        return _shown(f"{self.file}: {bodies} of {counts} points" + (f"; {self.remark}" if self.remark else ""))
+        count = len(self.curves) - len(self.polygons)
+        holes = f" with {count} hole{'s' * (count > 1)}" if count else ""
+        return _shown(f"{self.file}: {bodies} of {counts} points{holes}" + (f"; {self.remark}" if self.remark else ""))
 
 
 def _in_shape(shape: Any) -> list[Any]:
@@ -196,9 +213,10 @@ def _corners(part: Any) -> list[Any]:
             raise ConfigError("coordinates must be two real numbers a point")
         return [part]
     polygons = list(shapely.get_parts(part))
-    if not all(isinstance(polygon, shapely.Polygon) and not polygon.interiors for polygon in polygons):
-        raise ConfigError(f"must be of polygons without holes, not {part.geom_type}")
-    return [shapely.get_coordinates(polygon.exterior)[:-1] for polygon in polygons]
+    if not all(isinstance(polygon, shapely.Polygon) for polygon in polygons):
+        raise ConfigError(f"must be of polygons, not {part.geom_type}")
+    rings = [ring for polygon in polygons for ring in (polygon.exterior, *polygon.interiors)]
+    return [shapely.get_coordinates(ring)[:-1] for ring in rings]
 
 
 def _shown(text: str) -> str:
@@ -406,7 +424,7 @@ def _closed(curve: list[Line], name: str) -> tuple[shapely.Polygon, str]:
     if body.interiors or lost > SLIVER or shorter > SHORTENED:
         nearest = np.argsort(shapely.distance(edges, shapely.Point(x, y)), kind="stable")[:2]
         one, two = sorted((points[index] for index in nearest), key=lambda point: point.number)
-        remedy = "; what is in a hole has no part in the flow: leave its curve out" if body.interiors else ""
+        remedy = "; a hole is a curve of its own: put a blank line before it" if body.interiors else ""
         fault = f"the curve meets itself after this line and after line {two.number}, at ({x:.6g}, {y:.6g}){remedy}"
         raise _refusal(name, one, fault)
     if max(lost, shorter) < 1e-6:
@@ -424,19 +442,21 @@ def _parts_of(drawn: shapely.Polygon, edges: NDArray[np.object_]) -> list[shapel
     return list(shapely.get_parts(shapely.make_valid(drawn, method="structure", keep_collapsed=False)))
 
 
-def _check_apart(polygons: list[shapely.Polygon], name: str) -> None:
-    """Refuse bodies that meet."""
-    tree = shapely.STRtree(polygons)
-    for one, polygon in enumerate(polygons):
-        two = max(tree.query(polygon, predicate="intersects"))
-        if two == one:  # it meets none of those behind it
-            continue
-        common = polygon.intersection(polygons[two])
-        x, y = common.representative_point().coords[0]
-        inner, outer = sorted((one, two), key=lambda index: polygons[index].area)
-        if polygons[outer].contains(polygons[inner]):
-            raise ValueError(f"{name}: body {inner + 1} lies within body {outer + 1}; leave it out, it has no flow")
-        how = "overlap" if common.area > 0 else "touch"
-        raise ValueError(
-            f"{name}: bodies {one + 1} and {two + 1} {how} at ({x:.6g}, {y:.6g}); make them one, or part them"
-        )
+def _check_apart(curves: list[shapely.Polygon], name: str) -> None:
+    """Refuse curves that meet, by what they go around; one may lie within another."""
+    tree = shapely.STRtree(curves)
+    for one, curve in enumerate(curves):
+        around = 0
+        for two in tree.query(curve, predicate="intersects").tolist():
+            around += curves[two].contains_properly(curve)
+            if around > DEEPEST:
+                raise ValueError(f"{name}: curve {one + 1} lies within more than {DEEPEST} others; leave some out")
+            inner, outer = sorted((curve, curves[two]), key=lambda each: each.area)
+            if one >= two or outer.contains_properly(inner):
+                continue
+            common = inner.intersection(outer)
+            x, y = common.representative_point().coords[0]
+            how = "overlap" if common.area > 0 else "touch"
+            raise ValueError(
+                f"{name}: curves {one + 1} and {two + 1} {how} at ({x:.6g}, {y:.6g}); make them one, or part them"
+            )

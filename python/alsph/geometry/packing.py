@@ -15,7 +15,7 @@ from shapely import MultiPolygon, Polygon
 from alsph.arrays import FloatArray
 from alsph.geometry.lattice import inside, lattice, symmetric_centres
 from alsph.geometry.particles import neighbour_tree
-from alsph.geometry.thin import is_symmetric
+from alsph.geometry.thin import filled, is_symmetric, pockets
 
 BAND = 4.0
 """Particles as far from the body as this [Δx] are moved."""
@@ -87,6 +87,38 @@ class Planar:
         """Return the points (n, 2) of its outline that are nearest to points (n, 2)."""
         lines = shapely.shortest_line(shapely.points(points), self.body.boundary)
         return np.asarray(shapely.get_coordinates(lines)[1::2])
+
+
+@dataclass(frozen=True, eq=False)
+class Enclosed(Planar):
+    """What closes off fluid that fills the polygon `body`, as a :class:`Region` of the box of cells of area `box`."""
+
+    box: float
+
+    @property
+    def corners(self) -> tuple[FloatArray, FloatArray]:
+        """Those of the whole plane: it goes on around the fluid."""
+        return np.full(2, -np.inf), np.full(2, np.inf)
+
+    @property
+    def volume(self) -> float:
+        """The area of the box but for the fluid."""
+        return self.box - super().volume
+
+    def height(self, points: FloatArray) -> FloatArray:
+        """Return how far points (n, 2) lie in the fluid (n,), negative outside of it."""
+        return -super().height(points)
+
+
+def pack_around(cells: FloatArray, bodies: Polygon | MultiPolygon, solid: FloatArray, spacing: float) -> FloatArray:
+    """Return fluid particles (m, 2) around bodies of the plane and in their holes, as :func:`pack` does."""
+    found = [pack(cells, Planar(filled(bodies)), solid, spacing)]
+    for pocket in pockets(bodies):
+        lower, upper = np.split(np.array(pocket.bounds), 2)
+        margin = np.ceil(4 * WIDTH + 1) * spacing
+        box = cells[((cells > lower - margin) & (cells < upper + margin)).all(axis=1)]
+        found.append(pack(box, Enclosed(pocket, len(box) * spacing**2), solid, spacing))
+    return np.concatenate(found)
 
 
 def pack(cells: FloatArray, body: Region, solid: FloatArray, spacing: float) -> FloatArray:

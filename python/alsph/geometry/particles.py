@@ -76,7 +76,7 @@ def particles(
     velocity: ArrayLike,
     *,
     pressure: ArrayLike = 0.0,
-    body: int = 0,
+    body: ArrayLike = 0,
     normal: ArrayLike = 0.0,
     depth: ArrayLike = 0.0,
 ) -> dict[str, NDArray[Any]]:
@@ -87,7 +87,7 @@ def particles(
         "velocity": np.broadcast_to(np.asarray(velocity, float), position.shape).copy(),
         "pressure": np.broadcast_to(np.asarray(pressure, float), n).copy(),
         "kind": np.full(n, kind, np.uint8),
-        "body": np.full(n, body, np.uint16),
+        "body": np.broadcast_to(np.asarray(body, np.uint16), n).copy(),
         "normal": np.broadcast_to(np.asarray(normal, float), position.shape).copy(),
         "depth": np.broadcast_to(np.asarray(depth, float), n).copy(),
     }

@@ -52,8 +52,8 @@ class Solid:
         flip = np.array([1.0, -1.0])
         return Solid(self.position * flip, self.normal * flip, self.depth)
 
-    def particles(self, velocity: ArrayLike = 0.0, body: int = 0) -> dict[str, NDArray[Any]]:
-        """Return the arrays of these particles as part of the body with that index."""
+    def particles(self, velocity: ArrayLike = 0.0, body: ArrayLike = 0) -> dict[str, NDArray[Any]]:
+        """Return the arrays of these particles as part of the body with that index, or each of its own (n,)."""
         return particles(Kind.SOLID, self.position, velocity, body=body, normal=self.normal, depth=self.depth)
 
 
@@ -127,7 +127,8 @@ def facing(position: FloatArray, shape: Polygon, spacing: float) -> Solid:
 def _offset(shape: Polygon, depth: float) -> list[FloatArray]:
     """Return the vertices (n, 2) of the curves at that depth below the surface of `shape`."""
     parts = shapely.get_parts(shape.buffer(-depth))
-    return [shapely.get_coordinates(part.exterior)[:-1] for part in parts if not part.is_empty]
+    rings = [ring for part in parts if not part.is_empty for ring in (part.exterior, *part.interiors)]
+    return [shapely.get_coordinates(ring)[:-1] for ring in rings]
 
 
 def _along(vertices: FloatArray, spacing: float) -> FloatArray:

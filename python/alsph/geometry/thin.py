@@ -1,4 +1,7 @@
-"""Bodies as a resolution can carry them: parts that are too thin cut off, and two faces where the rest is thin."""
+"""Bodies as a resolution can carry them: parts that are too thin cut off, and two faces where the rest is thin.
+
+Holes that are too narrow are filled.
+"""
 
 from collections.abc import Sequence
 
@@ -11,6 +14,9 @@ from alsph.geometry.solids import Solid, body_layers, facing
 
 THINNEST = 2.0
 """Least thickness of a body [Δx]: a layer of solid particles for each face."""
+
+NARROWEST_HOLE = 4.0
+"""Least diameter of the largest disc in a hole [Δx] that is filled with fluid."""
 
 WIDE = np.radians(75)
 """Corners of a wider inner angle stay sharp."""
@@ -32,9 +38,11 @@ def carried(shape: Polygon | MultiPolygon, spacing: float) -> Polygon | MultiPol
     """Return what is left of a body when all that is thinner than 2 Δx, such as a sharp trailing edge, is cut off.
 
     It is the shape opened by a disc (all the discs of that diameter that fit in), but for the tips of its wide corners,
-    which stay. It tends to the shape as Δx falls, and is empty where no disc fits in.
+    which stay; holes narrower than 4 Δx are filled before. It tends to the shape as Δx falls, and is empty where no
+    disc fits in.
     """
     radius = 0.5 * THINNEST * spacing * (1 - 1e-3)  # a plate of just that thickness is carried
+    shape = _without_narrow_holes(shape, spacing)
     core = shape.buffer(-radius)
     if core.is_empty:
         return core
@@ -53,11 +61,36 @@ def carried(shape: Polygon | MultiPolygon, spacing: float) -> Polygon | MultiPol
     return half.union(_mirror_image(half))
 
 
+def _without_narrow_holes(shape: Polygon | MultiPolygon, spacing: float) -> Polygon | MultiPolygon:
+    """Return a shape with those of its holes filled that are too narrow for fluid."""
+    narrow = [hole for hole in holes(shape) if thickness(hole) < NARROWEST_HOLE * spacing * (1 - 1e-3)]
+    return shape.union(shapely.union_all(narrow)) if narrow else shape
+
+
+def holes(shape: Polygon | MultiPolygon) -> list[Polygon]:
+    """Return the holes of a shape."""
+    return [Polygon(ring) for part in shapely.get_parts(shape) for ring in part.interiors]
+
+
+def pockets(shape: Polygon | MultiPolygon) -> list[Polygon]:
+    """Return what of the holes of a shape is left by parts of it that lie in them."""
+    left = shapely.union_all(holes(shape)).difference(shape)
+    return [part for part in shapely.get_parts(left) if part.area > 0]
+
+
+def filled(shape: Polygon | MultiPolygon) -> Polygon | MultiPolygon:
+    """Return a shape with its holes filled, and what lies in them."""
+    parts = [Polygon(part.exterior) for part in shapely.get_parts(shape)]
+    outer = [part for part in parts if not any(other.contains_properly(part) for other in parts)]
+    return outer[0] if len(outer) == 1 else MultiPolygon(outer)
+
+
 def _wide_corners(shape: Polygon | MultiPolygon) -> FloatArray:
     """Return the convex corners (n, 2) that turn by more than 30 degrees and are wider than `WIDE` inside."""
     corners = [np.empty((0, 2))]
-    for polygon in shapely.get_parts(shape):
-        points = shapely.get_coordinates(shapely.geometry.polygon.orient(polygon).exterior)[:-1]
+    parts = [shapely.geometry.polygon.orient(part) for part in shapely.get_parts(shape)]
+    for ring in (ring for part in parts for ring in (part.exterior, *part.interiors)):
+        points = shapely.get_coordinates(ring)[:-1]
         before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
         turn = np.arctan2(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1))
         corners.append(points[(turn > np.radians(30)) & (turn < np.pi - WIDE)])
