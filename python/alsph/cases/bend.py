@@ -103,7 +103,7 @@ class Bend(Duct):
         return [
             Measure("largest error of the flow rate, UD", float(np.abs(rate - 1).max()), 0.0, 0.02, "mass balance"),
             Measure("relative L2 error of the velocity downstream", error, 0.0, 0.02, "exact solution (Poiseuille)"),
-            Measure("force on the bend, error", self._imbalance(run), 0.0, 0.03, "momentum balance of the bend"),
+            Measure("force on the bend, error", self._imbalance(run), 0.0, 0.04, "momentum balance of the bend"),
             Measure("pressure drop, ρU²", drop, straight + expected, 0.02, source),
             Measure("pressure drop beyond that of a straight channel, ρU²", drop - straight),
         ]

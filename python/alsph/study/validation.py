@@ -88,6 +88,7 @@ QUICK = (
     Entry("taylor_green", (16, 24), until=0.2, parameters={"dimensions": 3}),
     Entry("poiseuille", (20, 40), until=2.5),
     Entry("couette", (20, 40), until=2.5),
+    Entry("taylor_couette", (20,), until=1.0),
     Entry("pulsating_channel", (20, 40), until=1.6),
     Entry("backward_facing_step", (10,), until=40.0, parameters={"reynolds": 100, "downstream": 8.0}),
 )
@@ -99,6 +100,8 @@ FULL = (
     Entry("pulsating_channel", (20, 40, 80), until=1.6),
     Entry("pressure_jump", (20, 40), until=2.0),
     Entry("nozzle", (10, 20), until=20.0),
+    Entry("bend", (10, 20), until=20.0),
+    Entry("taylor_couette", (10, 20, 40), until=1.0),
     Entry("cavity", (25, 50, 100), until=24.0, parameters={"reynolds": 100}, continued=12.0),
     Entry("cavity", (50, 100), until=36.0, parameters={"reynolds": 400}, continued=18.0),
     Entry("cavity", (50, 100, 150), until=60.0, parameters={"reynolds": 1000}, continued=24.0),
