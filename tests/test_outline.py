@@ -27,7 +27,7 @@ def rows(points, form="{:.6f} {:.6f}"):
 
 def rings(*radii):
     angle = np.linspace(0, 2 * np.pi, 7)[:-1]
-    return "999 999\n".join(rows(radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)) for radius in radii)
+    return "999 999\n".join(rows(0.37 * radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)) for radius in radii)
 
 
 def read(folder: Path, content: str | bytes) -> Outline:
@@ -187,7 +187,7 @@ def test_bodies_have_forces_of_their_own_that_add_up(tmp_path):
         (b"\xff\xfe" + SQUARE.encode(), r"foil\.txt: (not a text file|holds no points)"),
         (SQUARE + "\n0 0\n1 0\n1 1\n0 1\n0 0\n", r"foil\.txt: curves 1 and 2 overlap at"),
         (SQUARE + "\n0.5 -0.5\n1 -0.5\n1 0.5\n0.5 0.5\n0.5 -0.5\n", r"foil\.txt: curves 1 and 2 touch at \(0.5, "),
-        (SQUARE + "999 999\n0 0\n.5 0\n0 .1\n", r"foil\.txt: curves 1 and 2 touch at \(0.5, 0\)"),
+        (SQUARE + "999 999\n0 0\n.5 0\n0 .1\n", r"foil\.txt: curves 1 and 2 overlap at"),
         (rings(*range(1, 13)), r"foil\.txt: curve 1 lies within more than 10 others"),
         ("0 0\n3 0\n3 3\n0 3\n0 0\n1 1\n1 2\n2 2\n2 1\n1 1\n", r"foil\.txt:1: .*meets itself .*a hole"),
     ],
@@ -237,7 +237,7 @@ def test_no_folder_device_pipe_or_giant_is_read(tmp_path):
         ("".join(f"{k % 2} {k % 3}\n" for k in range(19_000)), "the curve meets itself"),
         ("".join(f"{k % 2} {k % 3}\n" for k in range(200_000)), "has 200,001 lines"),
         ("".join(f"0 0\n{k} 0\n{k} 5\n0 0\n\n" for k in range(1, 3000)), "overlap"),
-        (rings(*range(3500, 0, -1)), "curve 12 lies within more than 10 others"),
+        (rings(*range(3000, 0, -1)), "curve 12 lies within more than 10 others"),
         ("".join(f"{k} 0\n" for k in range(25_000)), "holds 25,000 points"),
     ],
     ids=["random", "zigzag", "long", "bodies", "nested", "many"],
@@ -375,7 +375,7 @@ def test_shapes_made_in_python_are_bodies_that_run_resume_and_repeat(tmp_path):
         ([ELLIPSE, ELLIPSE], "curves 1 and 2 overlap"),
         ([[0, 0], [1, 1], [1, 0], [0, 1]], "the curve meets itself"),
         (shapely.Point(0, 0), "must be of polygons, not Point"),
-        (shapely.Polygon(ELLIPSE, [ELLIPSE + [1.5, 0]]), "curves 1 and 2"),
+        (shapely.Polygon(ELLIPSE, [ELLIPSE + [0.2, 0]]), "curves 1 and 2"),
     ],
 )
 def test_what_is_no_shape_is_refused(shape, problem):
