@@ -1,6 +1,6 @@
 //! Whole steps: exact solutions, symmetry, conservation, and the same bits on any number of threads.
 
-use alsph::settings::{DensityDiffusion, SchemeSettings};
+use alsph::settings::{DensityDiffusion, ProjectionSettings, SchemeSettings, Solver};
 use alsph::{Clock, ParticleKind, Particles, Settings, Simulation, Vector};
 use approx::assert_relative_eq;
 use serde_json::{Value, json};
@@ -365,6 +365,28 @@ fn weakly_compressible_fluid_comes_to_rest_between_walls() {
         let fastest = fluid().map(|i| particles.velocity[i][1].abs()).fold(0.0, f64::max);
         let error = fluid().map(|i| (particles.pressure[i] - 0.5 + particles.position[i][1]).abs()).fold(0.0, f64::max);
         assert!(fastest < 0.02 && error < tolerance, "{scheme:?}, {balanced}: u {fastest}, p {error}");
+    }
+}
+
+/// A Poisson equation that has all of the flux into the walls finds the pressure of fluid at rest from nothing, and stops it.
+#[test]
+fn projected_fluid_comes_to_rest_between_walls() {
+    for (pressure_share, solver) in [(0.9, Solver::Bicgstab), (0.0, Solver::Bicgstab), (0.9, Solver::Multigrid)] {
+        for rule in ["linear", "adami"] {
+            let (mut settings, particles) = tank(rule);
+            let own = ProjectionSettings { pressure_share, solver, tolerance: 1e-3, max_solver_iterations: 50 };
+            settings.scheme = SchemeSettings::Isph(own);
+            settings.projection_sweeps = 1;
+            let mut simulation = Simulation::new(settings, particles, Clock::default(), Some(2)).expect("valid");
+            simulation.advance_until(2.0, None).expect("stable");
+            let particles = simulation.particles();
+            let fluid = || (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Fluid);
+            let fastest = fluid().map(|i| particles.velocity[i][1].abs()).fold(0.0, f64::max);
+            let mean = fluid().map(|i| particles.pressure[i]).sum::<f64>() / fluid().count() as f64;
+            let error = |i: usize| (particles.pressure[i] - mean - 0.5 + particles.position[i][1]).abs();
+            let largest = fluid().map(error).fold(0.0, f64::max);
+            assert!(fastest < 0.01 && largest < 0.05, "{own:?} {rule}: u {fastest}, p {largest}");
+        }
     }
 }
 

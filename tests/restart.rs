@@ -39,6 +39,9 @@ const FACTORS: [(&str, &[&str]); 19] = [
             r#"{"kind": "alsph"}"#,
             r#"{"kind": "wcsph", "sound_speed": 10, "density_diffusion": "antuono", "diffusion_coefficient": 0.1}"#,
             r#"{"kind": "edac", "sound_speed": 10, "diffusion_coefficient": 0.5}"#,
+            r#"{"kind": "isph", "pressure_share": 0.9, "solver": "bicgstab", "tolerance": 1e-3, "max_solver_iterations": 10}"#,
+            r#"{"kind": "isph", "pressure_share": 0, "solver": "multigrid", "tolerance": 0, "max_solver_iterations": 2}"#,
+            r#"{"kind": "isph", "pressure_share": 1, "solver": "jacobi", "tolerance": 0.1, "max_solver_iterations": 9}"#,
         ],
     ),
     ("shifting", &["strain", "xsph", "maximum_velocity", "none"]),
@@ -121,11 +124,14 @@ fn settings<const D: usize>(configuration: &Configuration, spacing: f64) -> Valu
         (value["derivative_frame"], value["search_every_iteration"]) = ("updated".into(), true.into());
     }
     if value["scheme"]["kind"] != "alsph" {
-        // What a weakly compressible scheme refuses.
+        // What other schemes refuse.
         value["velocity_laplacian"] = "scalar".into();
         if value["wall_pressure"] == "paper" {
             value["wall_pressure"] = "adami".into();
         }
+    }
+    if value["scheme"]["kind"] == "isph" && value["derivative_frame"] == "updated" {
+        (value["derivative_frame"], value["search_every_iteration"]) = ("initial".into(), false.into());
     }
     value["max_iterations"] = 2.into();
     value["body_force"] = json!([0.2, -0.1, 0.1][..D]);

@@ -174,6 +174,22 @@ fn a_weakly_compressible_scheme_has_parameters_of_its_own() {
         let text = refused(&[("/velocity_laplacian", json!("scalar")), ("/wall_pressure", json!("linear")), (pointer, bad)]);
         assert!(text.contains(word), "{text}");
     }
+    let isph =
+        json!({"kind": "isph", "pressure_share": 0.9, "solver": "bicgstab", "tolerance": 1e-3, "max_solver_iterations": 9});
+    for (pointer, bad, word) in [
+        ("/scheme/pressure_share", json!(1.1), "scheme.pressure_share"),
+        ("/scheme/tolerance", json!(-1.0), "scheme.tolerance"),
+        ("/scheme/max_solver_iterations", json!(0), "scheme.max_solver_iterations"),
+        ("/scheme/solver", json!("cg"), "cg"),
+        ("/derivative_frame", json!("updated"), "derivative_frame"),
+        ("/wall_pressure", json!("paper"), "wall_pressure"),
+    ] {
+        let chosen =
+            [("/scheme", isph.clone()), ("/velocity_laplacian", json!("scalar")), ("/wall_pressure", json!("linear"))];
+        let value = with(&[&chosen[..], &[(pointer, bad)]].concat());
+        let text = Settings::from_json(&value.to_string()).expect_err("refused").to_string();
+        assert!(text.contains(word), "{text}");
+    }
     // The step follows the sound and the flow: 0.45 of 2 Δx/√λ.
     let settings = common::parse(&with(&[
         ("/scheme", wcsph),

@@ -19,7 +19,7 @@ FLOORS = (
     ("frame",),
     ("forcing",),
     ("boundary", "breakdown", "interpolation"),
-    ("flow",),
+    ("flow", "poisson"),
     ("loads", "shifting"),
     ("scheme",),
     ("report",),

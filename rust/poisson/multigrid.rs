@@ -17,6 +17,9 @@ const WIDTH: f64 = 2.0;
 /// A cell filled less than this is taken for empty.
 const EMPTY: f64 = 0.05;
 
+/// How much farther the centres of two cells are apart than that of one from the first particles in the other.
+const NEARER: f64 = WIDTH / (0.5 * WIDTH + 0.5);
+
 /// How much nearer the centre of a cell is to where the pressure is zero than that of the next coarser one.
 const FARTHER: f64 = 0.6;
 
@@ -213,7 +216,7 @@ impl<const D: usize> Level<D> {
             }
         });
         parallel::for_each(&mut self.outlet, |cell, outlet| {
-            let through = |axis: usize, other: u32| shares[cell][0].min(shares[other as usize][1]) * area[axis];
+            let through = |axis: usize, other: u32| NEARER * shares[cell][0].min(shares[other as usize][1]) * area[axis];
             *outlet = (0..D).map(|axis| beside[cell][axis].map(|other| through(axis, other)).iter().sum::<f64>()).sum();
         });
         self.sum_up();

@@ -178,7 +178,12 @@ impl Settings {
     fn validate_scheme(&self) -> Result<()> {
         match self.scheme {
             SchemeSettings::Alsph => return Ok(()),
-            SchemeSettings::Isph(own) => own.validate()?,
+            SchemeSettings::Isph(own) => {
+                own.validate()?;
+                if self.derivative_frame == DerivativeFrame::Updated {
+                    return Err(setting("derivative_frame", "must be \"initial\" or \"midpoint\" in the scheme isph"));
+                }
+            }
             SchemeSettings::Wcsph { sound_speed, diffusion_coefficient, .. }
             | SchemeSettings::Edac { sound_speed, diffusion_coefficient } => {
                 if !(sound_speed.is_finite() && sound_speed > 0.0) {
@@ -189,9 +194,6 @@ impl Settings {
                     return Err(setting("scheme.diffusion_coefficient", problem));
                 }
             }
-        }
-        if self.derivative_frame == DerivativeFrame::Updated {
-            return Err(setting("derivative_frame", "must be \"initial\" or \"midpoint\" but in the scheme alsph"));
         }
         if self.velocity_laplacian == VelocityLaplacian::Vector {
             return Err(setting("velocity_laplacian", "must be \"scalar\" but in the scheme alsph"));

@@ -413,7 +413,12 @@ class Case(Driven):
         return min(self.largest_time_step, *limits.values())
 
     def expected_penalty_constant(self) -> float:
-        """Return C_BV = (c/u_max)² at the expected largest velocity, c the speed of sound of penalty or scheme."""
+        """Return C_BV = (c/u_max)² at the expected largest velocity, c the speed of sound of penalty or scheme.
+
+        It is infinite with a Poisson equation for the pressure.
+        """
+        if self.scheme == "isph":
+            return math.inf
         if self.is_weakly_compressible:
             return float((self.settings()["scheme"]["sound_speed"] / self.velocity_max) ** 2)
         if self.penalty_constant is not None:

@@ -36,29 +36,47 @@ def _as_in_the_paper(values: Mapping[str, Any]) -> bool:
     return any(values.get(name) is not None for name in PAPER) or values.get("algorithm") not in (None, "midpoint")
 
 
-def _wall_pressure(scheme: Any) -> str:
-    """Return the rule of the walls' pressure of a scheme where none is given."""
-    return "adami" if scheme in tuple(DIFFUSION) else "linear"
+def _goes_with(scheme: Any) -> dict[str, Any]:
+    """Return what goes with a scheme where nothing else is given."""
+    return {
+        "wall_pressure": "adami" if scheme in tuple(DIFFUSION) else "linear",
+        "projection_sweeps": 1 if scheme == "isph" else 4,
+    }
 
 
 def superseded(changes: Mapping[str, Any], before: Mapping[str, Any]) -> tuple[str, ...]:
     """Names of the parameters whose place others take, of a case that had those of `before`.
 
     A Courant number takes that of the paper's pair, which takes its; the coefficient of a shifting goes with its kind,
-    the rule of the walls' pressure with the scheme, if it was the scheme's. From units the Reynolds number follows.
+    the rule of the walls' pressure and the number of sweeps with the scheme, if they were the scheme's. From units the
+    Reynolds number follows.
     """
     others: tuple[str, ...] = ()
     if any(changes.get(name) is not None for name in ("shifting", "dimensions")):
         others += ("shift_coefficient",)
     schemes = [table.get("scheme") or "alsph" for table in (before, {**before, **changes})]
-    if schemes[0] != schemes[1] and before.get("wall_pressure") == _wall_pressure(schemes[0]):
-        others += ("wall_pressure",)
+    if schemes[0] != schemes[1]:
+        others += tuple(name for name, value in _goes_with(schemes[0]).items() if before.get(name) == value)
     if changes.get("units") is not None:
         others += ("reynolds",)
     if changes.get("courant") is not None:
         return (*PAPER, *others)
     return ("courant", *others) if _as_in_the_paper(changes) else others
 
+
+SCHEMES = ("alsph", "isph", "wcsph", "edac")
+
+OWN = {
+    "penalty_constant": ("alsph",),
+    "solver": ("isph",),
+    "solver_tolerance": ("isph",),
+    "solver_iterations": ("isph",),
+    "pressure_share": ("isph",),
+    "sound_speed": ("wcsph", "edac"),
+    "density_diffusion": ("wcsph",),
+    "diffusion_coefficient": ("wcsph", "edac"),
+}
+"""The schemes that a parameter belongs to, of those that do not belong to all."""
 
 DIFFUSION = {"wcsph": 0.1, "edac": 0.5}
 """Coefficient of each weakly compressible scheme's diffusion where none is given: δ of δ-SPH, α of EDAC."""
@@ -72,8 +90,8 @@ class Method(Parameters):
 
     scheme: Literal["alsph", "isph", "wcsph", "edac"] | None = Field(
         default=None,
-        description="augmented Lagrangian SPH, projection ISPH, weakly compressible SPH, or entropically damped artificial "
-        "compressibility; alsph if not given",
+        description="augmented Lagrangian SPH, projection ISPH, weakly compressible SPH, or entropically damped "
+        "artificial compressibility; alsph if not given",
     )
     sound_speed: float | None = Field(
         default=None, gt=0, description="speed of sound of wcsph and edac, 10 if not given [U]"
@@ -92,7 +110,10 @@ class Method(Parameters):
         description="how isph solves the Poisson equation of the pressure, bicgstab if not given",
     )
     solver_tolerance: float | None = Field(
-        default=None, ge=0, lt=1, description="relative residual that a solve of isph ends with, 1e-3 if not given [-]"
+        default=None,
+        ge=0,
+        lt=1,
+        description="relative residual that a solve of isph ends with, 1e-3 if not given [-]",
     )
     solver_iterations: int | None = Field(
         default=None, ge=1, le=1000, description="cap of the iterations of a solve of isph, 200 if not given [-]"
@@ -138,7 +159,10 @@ class Method(Parameters):
     )
     max_iterations: int = Field(default=2, ge=1, le=1000, description="cap of the inner iterations of a step [-]")
     projection_sweeps: int = Field(
-        default=4, ge=0, le=1000, description="projection sweeps after the iterations of a step, 0 in the paper [-]"
+        default=4,
+        ge=0,
+        le=1000,
+        description="projection sweeps after the iterations of a step, 0 in the paper; 1 if not given with isph [-]",
     )
     sweep_weights: Literal["chebyshev", "equal"] | None = Field(
         default=None,
@@ -202,7 +226,7 @@ class Method(Parameters):
     wall_pressure: Literal["paper", "adami", "linear"] = Field(
         default="linear",
         description="pressure of solid particles: eqs. (10) and (20), or that of the fluid around, constant or linear; "
-        "adami if not given with wcsph and edac, whose sound grows where it is linear",
+        "adami if not given with wcsph and edac, whose sound grows where it is linear; paper with alsph alone",
     )
 
     @model_validator(mode="before")
@@ -212,13 +236,14 @@ class Method(Parameters):
             strain = 0.25 if values.get("dimensions", cls.in_space) == 3 else 0.75  # in 3-D more neighbours push
             kind = values.get("shifting")
             values = values | {"shift_coefficient": strain if kind in (None, "strain") else 0.04}
-        if values.get("wall_pressure") is None:
-            values = values | {"wall_pressure": _wall_pressure(values.get("scheme"))}
+        values = values | {
+            name: value for name, value in _goes_with(values.get("scheme")).items() if values.get(name) is None
+        }
         if values.get("courant") is not None:
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")
             return values
-        if values.get("scheme") in ("isph", *DIFFUSION):  # it may be anything
+        if values.get("scheme") in SCHEMES[1:]:  # it may be anything
             return values if values.get("time_step") is not None else values | {"courant": COURANT}
         if not _as_in_the_paper(values):
             return values | {"courant": COURANT}
@@ -228,19 +253,9 @@ class Method(Parameters):
     @classmethod
     def _what_belongs_to_the_scheme(cls, values: dict[str, Any]) -> dict[str, Any]:
         scheme = values.get("scheme") or "alsph"
-        if scheme not in ("alsph", "isph", *DIFFUSION):
+        if scheme not in SCHEMES:
             return values  # its own check refuses it
-        own = {
-            "sound_speed": ("wcsph", "edac"),
-            "diffusion_coefficient": ("wcsph", "edac"),
-            "density_diffusion": ("wcsph",),
-            "penalty_constant": ("alsph",),
-            "solver": ("isph",),
-            "solver_tolerance": ("isph",),
-            "solver_iterations": ("isph",),
-            "pressure_share": ("isph",),
-        }
-        for name, schemes in own.items():
+        for name, schemes in OWN.items():
             if values.get(name) is not None and scheme not in schemes:
                 raise ValueError(f"{name}: of the scheme {' or '.join(schemes)}, not of {scheme}; leave it out")
         if scheme != "alsph" and values.get("algorithm") not in (None, "midpoint"):
@@ -264,7 +279,7 @@ class Method(Parameters):
                 "pressure_share": 0.9 if self.pressure_share is None else self.pressure_share,
                 "solver": self.solver or "bicgstab",
                 "tolerance": 1e-3 if self.solver_tolerance is None else self.solver_tolerance,
-                "max_solver_iterations": self.solver_iterations or 200,
+                "max_solver_iterations": self.most_iterations,
             }
         if not self.is_weakly_compressible:
             return {"kind": "alsph"}
@@ -279,10 +294,17 @@ class Method(Parameters):
         return settings
 
     @property
+    def most_iterations(self) -> int:
+        """Cap of the iterations of a step, with isph those of its solver."""
+        return self.solver_iterations or 200 if self.scheme == "isph" else self.max_iterations
+
+    @property
     def passes(self) -> int:
         """About how often a step goes over all pairs of particles."""
         if self.is_weakly_compressible:
             return 7
+        if self.scheme == "isph":
+            return 30 + 2 * self.projection_sweeps
         iteration = 8 if self.algorithm in (1, "original") else 4
         return 5 + iteration * self.max_iterations + 2 * self.projection_sweeps
 

@@ -24,7 +24,8 @@ from alsph.tables import markdown
 KINDS = ("png", "pdf", "svg")
 """Formats of figures."""
 
-FIELDS = ("vorticity", "pressure", "velocity", "velocity_divergence")
+FIELDS = ("vorticity", "pressure", "velocity", "velocity_divergence", "q_criterion", "lambda_2")
+DERIVED = FIELDS[4:]
 GRIDS = ("vtkhdf", "netcdf", "csv")
 """What alsph.plotting and alsph.results.export, which help need not wait for, know by these names."""
 
@@ -138,6 +139,7 @@ def _plot(
     kind: Annotated[str, typer.Option("--format", help="format of the figures", **one_of(*KINDS))] = "png",
     dpi: Annotated[int, typer.Option(min=10, max=2400, help="pixels an inch of png")] = 100,
     plane: Plane = None,
+    streamlines: Annotated[bool, typer.Option("--streamlines", help="draw streamlines over the fields")] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="folder for the figures", show_default="RUN/figures")
     ] = None,
@@ -156,7 +158,7 @@ def _plot(
         alsph.plotting.field_style(name)
     figures = output or path / "figures"
     drawings = _drawings(run, body or []) | {
-        name: functools.partial(run.plot_field, name, time, plane=plane) for name in names
+        name: functools.partial(run.plot_field, name, time, plane=plane, streamlines=streamlines) for name in names
     }
     if not output:
         check_folder(figures)
@@ -234,6 +236,10 @@ def _export(
     spacing: Annotated[
         float | None, typer.Option(help="spacing of the grid [D]", show_default="the particles'")
     ] = None,
+    field: Annotated[
+        list[str] | None,
+        typer.Option(help="field to write, too, may be repeated", show_default="none", **one_of(*DERIVED)),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="file, .vtkhdf, .nc or .csv", show_default="RUN/flow.vtkhdf"),
@@ -249,7 +255,7 @@ def _export(
         choose("to", to, FORMATS)
     if output and to and output.suffix != FORMATS[to]:
         raise ConfigError(f"{output}: a file in the format {to} ends in {FORMATS[to]}")
-    grid = alsph.Run(path).to_grid(time, spacing)
+    grid = alsph.Run(path).to_grid(time, spacing, derived=field or [])
     if time is not None:
         complain(f"fields at t* = {grid.time:.6g}, the output nearest to {time:g}")
     say(grid.save(output or path / f"flow{FORMATS[to or 'vtkhdf']}"))

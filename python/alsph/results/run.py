@@ -183,8 +183,9 @@ class Run(Loads):
             results["shedding periods"] = self.window.periods
         results["mean velocity divergence, |∇·u| D/U"] = self.divergence.mean
         results["largest velocity divergence, |∇·u| D/U"] = self.divergence.max
-        waves = "" if self.config.case.is_weakly_compressible else " of the penalty"
-        results[f"artificial Mach number{waves}"] = Estimate(mach_number(self.history))
+        if np.isfinite(self.config.case.expected_penalty_constant()):
+            waves = "" if self.config.case.is_weakly_compressible else " of the penalty"
+            results[f"artificial Mach number{waves}"] = Estimate(mach_number(self.history))
         for measure in self.measures:
             value = measure.value
             results[measure.name] = value if isinstance(value, Estimate) else Estimate(value)
@@ -198,7 +199,7 @@ class Run(Loads):
         taken = f"{iterations.mean():.3g} of at most " if iterations.size else "at most "
         if case.is_weakly_compressible:
             return "1"
-        return f"{taken}{case.max_iterations}, then {case.projection_sweeps} projection sweeps"
+        return f"{taken}{case.most_iterations}, then {case.projection_sweeps} projection sweeps"
 
     def plot_forces(self, path: str | Path | None = None, body: str | None = None) -> Figure:
         """Figure of drag and lift over time with their parts and the averaging window; saved if `path` is given."""

@@ -50,11 +50,10 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
         ("memory", f"about {np.ceil(case.memory() / 2**20):,.0f} MiB, beside Python's own"),
         *((name, f"{value:.3g}") for name, value in case.scales().items()),
         ("time step", f"ΔtU/Δx = {step:.4g}" + (" (adaptive)" if case.adaptive_time_step else "")),
-        (
-            "speed of sound" if case.is_weakly_compressible else "penalty",
-            f"C_BV = (c/u_max)² = {constant:.3g}: artificial Mach number {constant**-0.5:.2g}",
-        ),
     ]
+    if np.isfinite(constant):
+        name = "speed of sound" if case.is_weakly_compressible else "penalty"
+        lines.append((name, f"C_BV = (c/u_max)² = {constant:.3g}: artificial Mach number {constant**-0.5:.2g}"))
     for name, limit in limits.items():
         if np.isfinite(limit):
             text = f"ΔtU/Δx < {limit:.4g} at u_max = {case.velocity_max:g} U{' (binds)' if name == binding else ''}"

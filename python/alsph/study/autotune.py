@@ -170,7 +170,7 @@ def autotune(
             raise ConfigError(f"{name} = {value}: must be a positive number")
     if margin > 1:
         raise ConfigError(f"margin = {margin}: must not exceed 1, the largest stable step itself")
-    if case.is_weakly_compressible:
+    if case.scheme not in (None, "alsph"):
         raise ConfigError(f"scheme = {case.scheme}: only steps and iterations of alsph can be tuned; leave scheme out")
     tuner = _Tuner(case, develop, probe, threads, Console(highlight=False, quiet=not progress, soft_wrap=True))
     stable, unstable = tuner.time_step()
