@@ -26,6 +26,8 @@ mod j_simulation;
 mod k_operators;
 #[path = "neighbours.rs"]
 mod l_neighbours;
+#[path = "poisson.rs"]
+mod l_poisson;
 #[path = "forcing.rs"]
 mod m_forcing;
 #[path = "custom_scheme.rs"]
