@@ -86,7 +86,7 @@ fn solvers_take_few_iterations_whatever_the_number_of_particles() {
                 (Solver::Multigrid, 1e-8, 14),
             ] {
                 let (solution, _) = solve(&set, &settings, solver, &source, tolerance);
-            let message = format!("{name}, {kind}, {solver:?} to {tolerance}: {solution:?}");
+                let message = format!("{name}, {kind}, {solver:?} to {tolerance}: {solution:?}");
                 assert!(solution.residual <= tolerance && solution.iterations <= most, "{message}");
             }
         }
