@@ -14,7 +14,7 @@ pub type Rule<const D: usize> = Box<dyn FnMut(&[Vector<D>], f64) -> Result<Vec<V
 pub struct Forcing<const D: usize> {
     /// Body force per unit mass, added to that of the settings.
     pub body_force: Option<Rule<D>>,
-    /// Velocity of the solid particles of bodies that have none of their own.
+    /// Velocity of the surface above the solid particles of bodies that have none of their own.
     pub surface_velocity: Option<Rule<D>>,
 }
 
@@ -61,7 +61,9 @@ impl<const D: usize> Forcing<D> {
             let own = |i: &usize| settings.bodies[particles.body[*i] as usize].velocity.is_none();
             let solid = |i: &usize| particles.kind[*i] == ParticleKind::Solid;
             let solids: Vec<_> = (0..particles.real).filter(solid).filter(own).collect();
-            let position: Vec<_> = solids.iter().map(|&i| position[i]).collect();
+            // Of the surface above, not of the particle: one that turns is slower inside.
+            let above = |&i: &usize| position[i] + particles.normal[i] * particles.depth[i];
+            let position: Vec<_> = solids.iter().map(above).collect();
             let values = asked("surface velocity", rule, &position, time)?;
             let velocity = frame.images.real(&mut particles.velocity);
             solids.into_iter().zip(values).for_each(|(i, value)| velocity[i] = value);

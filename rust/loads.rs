@@ -7,7 +7,7 @@
 //! the velocity's slope at the surface is known, the viscous part is its shear over the area of the surface, and the pressure part the rest.
 
 use crate::base::parallel;
-use crate::base::{ExactSum, Vector};
+use crate::base::{ExactSum, Matrix, Vector};
 use crate::boundary::{Walls, surface_area};
 use crate::frame::Frame;
 use crate::particles::{ParticleKind, Particles};
@@ -114,10 +114,34 @@ fn force_on<const D: usize>(
         let normal = &particles.normal[s];
         // Without divergence the normal velocity has no slope at a wall; that of the fit is no stress.
         let along = slope - normal * slope.dot(normal);
-        let shear = along * (viscosity * surface_area(settings, particles, stencil, s));
-        (pressure, viscous) = (pressure + viscous - shear, shear);
+        let factor = viscosity * surface_area(settings, particles, stencil, s);
+        let turning = if factor > 0.0 { turning(settings, particles, frame, s) } else { Vector::zeros() };
+        let shear = along * factor;
+        (pressure, viscous) = (pressure + viscous - shear, shear + turning * factor);
     }
     (pressure, viscous)
+}
+
+/// (∇u)ᵀ n of the surface above solid particle `s`, along it: what the stress has beside the slope where the surface turns, −u/R on a cylinder
+/// of radius R. Its torque alone is not zero. From the solids of the body around, whose velocity is that of the surface above them.
+fn turning<const D: usize>(settings: &Settings, particles: &Particles<D>, frame: &Frame<D>, s: usize) -> Vector<D> {
+    let Particles { position, normal, depth, velocity, body, .. } = particles;
+    let above = |a: usize| position[a] + normal[a] * depth[a];
+    let n = &normal[s];
+    let near = || frame.stencil.solids_near(settings, s).filter(|&a| body[a] == body[s]);
+    if near().all(|a| velocity[a] == velocity[s]) {
+        return Vector::zeros();
+    }
+    // Least squares of the differences along the surface; nothing is known across it.
+    let (mut moments, mut sums) = (Matrix::<D>::zeros(), Vector::<D>::zeros());
+    for a in near().filter(|&a| normal[a].dot(n) > 0.0) {
+        let away = above(a) - above(s);
+        let along = away - n * away.dot(n);
+        moments += along * along.transpose();
+        sums += along * (velocity[a] - velocity[s]).dot(n);
+    }
+    moments += n * n.transpose() * moments.trace();
+    moments.try_inverse().map_or_else(Vector::zeros, |inverse| inverse * sums)
 }
 
 fn components<const D: usize>(v: &Vector<D>) -> [f64; 3] {

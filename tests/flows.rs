@@ -371,11 +371,18 @@ fn weakly_compressible_fluid_comes_to_rest_between_walls() {
 /// A Poisson equation that has all of the flux into the walls finds the pressure of fluid at rest from nothing, and stops it.
 #[test]
 fn projected_fluid_comes_to_rest_between_walls() {
-    for (pressure_share, solver) in [(0.9, Solver::Bicgstab), (0.0, Solver::Bicgstab), (0.9, Solver::Multigrid)] {
+    let solved = |pressure_share, solver, tolerance, max_solver_iterations| {
+        SchemeSettings::Isph(ProjectionSettings { pressure_share, solver, tolerance, max_solver_iterations })
+    };
+    for own in [
+        solved(0.9, Solver::Bicgstab, 1e-3, 50),
+        solved(0.0, Solver::Bicgstab, 1e-3, 50),
+        solved(0.9, Solver::Multigrid, 0.0, 2),
+        SchemeSettings::ExplicitIsph { sweeps: 2, mach_number: 0.1 },
+    ] {
         for rule in ["linear", "adami"] {
             let (mut settings, particles) = tank(rule);
-            let own = ProjectionSettings { pressure_share, solver, tolerance: 1e-3, max_solver_iterations: 50 };
-            settings.scheme = SchemeSettings::Isph(own);
+            settings.scheme = own;
             settings.projection_sweeps = 1;
             let mut simulation = Simulation::new(settings, particles, Clock::default(), Some(2)).expect("valid");
             simulation.advance_until(2.0, None).expect("stable");

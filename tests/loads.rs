@@ -209,6 +209,24 @@ fn the_friction_of_a_circling_flow_turns_a_cylinder() {
 }
 
 /// A flow along a plate under it: friction and its torque about any point.
+/// Fluid that turns like a rigid body with the surface has no friction on it: its slope ω gives a torque of 2π μ ω R², and its transpose as
+/// much the other way.
+#[test]
+fn fluid_that_turns_with_a_cylinder_leaves_it_alone() {
+    for (side, tolerance) in [(20, 0.2), (40, 0.1), (80, 0.05)] {
+        let mut particles = cylinder(side);
+        for i in 0..particles.real {
+            let arm = particles.position[i].add_scalar(-0.5);
+            let solid = particles.kind[i] == ParticleKind::Solid;
+            particles.velocity[i] = Vector::from([-arm[1], arm[0]]) * if solid { common::RADIUS / arm.norm() } else { 1.0 };
+        }
+        let load = load_on(side, "cubic", &[0.5, 0.5], particles);
+        let slope = TAU * VISCOSITY * common::RADIUS.powi(2);
+        assert!(load.viscous_torque[2].abs() < tolerance * slope, "{side}: {} of {slope}", load.viscous_torque[2]);
+        assert!(load.viscous_force.norm() < 1e-3 * VISCOSITY, "{side}: {}", load.viscous_force);
+    }
+}
+
 #[test]
 fn the_friction_on_a_plate_turns_it_about_a_point_beside_it() {
     let plate = around(40, 0.1, |x: &Vector<2>| (x[1] < 0.5).then(|| (0.5 - x[1], Vector::y())));

@@ -31,7 +31,8 @@ fn solve<const D: usize>(
     let mut poisson = Poisson::default();
     poisson.begin(settings, particles, frame, solver);
     let (mut source, mut x) = (source.to_vec(), vec![0.0; particles.len()]);
-    let solution = poisson.solve(system, solver, Goal { tolerance, max_iterations: 1000 }, &mut source, &mut x);
+    let solution =
+        poisson.solve(system, solver, Goal { tolerance, max_iterations: 1000, damping: 0.5 }, &mut source, &mut x);
     x.truncate(particles.real);
     (solution, x)
 }

@@ -41,6 +41,7 @@ const FACTORS: [(&str, &[&str]); 19] = [
             r#"{"kind": "edac", "sound_speed": 10, "diffusion_coefficient": 0.5}"#,
             r#"{"kind": "isph", "pressure_share": 0.9, "solver": "bicgstab", "tolerance": 1e-3, "max_solver_iterations": 10}"#,
             r#"{"kind": "isph", "pressure_share": 0, "solver": "multigrid", "tolerance": 0, "max_solver_iterations": 2}"#,
+            r#"{"kind": "explicit_isph", "sweeps": 2, "mach_number": 0.1}"#,
             r#"{"kind": "isph", "pressure_share": 1, "solver": "jacobi", "tolerance": 0.1, "max_solver_iterations": 9}"#,
         ],
     ),
@@ -130,7 +131,7 @@ fn settings<const D: usize>(configuration: &Configuration, spacing: f64) -> Valu
             value["wall_pressure"] = "adami".into();
         }
     }
-    if value["scheme"]["kind"] == "isph" && value["derivative_frame"] == "updated" {
+    if value["scheme"]["kind"].as_str().is_some_and(|kind| kind.contains("isph")) && value["derivative_frame"] == "updated" {
         (value["derivative_frame"], value["search_every_iteration"]) = ("initial".into(), false.into());
     }
     value["max_iterations"] = 2.into();

@@ -16,8 +16,10 @@ SCHEMES = (
 )
 ISPH = (
     {"scheme": "isph"},
-    {"scheme": "isph", "solver": "multigrid", "solver_iterations": 2},
+    {"scheme": "isph", "solver": "multigrid", "solver_tolerance": 0.0, "solver_iterations": 2},
     {"scheme": "isph", "pressure_share": 0.0},
+    {"scheme": "explicit_isph"},
+    {"scheme": "explicit_isph", "solver_iterations": 3},
 )
 
 
@@ -41,6 +43,7 @@ def test_a_scheme_has_parameters_of_its_own(small):
         "tolerance": 0.0,
         "max_solver_iterations": 1,
     }
+    assert engine(scheme="explicit_isph") == {"kind": "explicit_isph", "sweeps": 1, "mach_number": 0.1}
     # Configurations of before are named as they were.
     assert not {"scheme", "sound_speed", "density_diffusion"} & Config(small).case_tables().keys()
 
@@ -53,11 +56,12 @@ def test_a_scheme_has_parameters_of_its_own(small):
         ({"scheme": "wcsph", "penalty_constant": 50}, "penalty_constant: of the scheme alsph, not of wcsph"),
         ({"solver": "multigrid"}, "solver: of the scheme isph, not of alsph; leave it out"),
         ({"scheme": "isph", "sound_speed": 10.0}, "sound_speed: of the scheme wcsph or edac, not of isph"),
+        ({"scheme": "isph", "mach_number": 0.2}, "mach_number: of the scheme explicit_isph, not of isph"),
         ({"scheme": "isph", "algorithm": 1}, "algorithm = 1: of the scheme alsph, not of isph"),
         ({"scheme": "isph", "solver": "cg"}, "solver = 'cg': must be 'bicgstab', 'multigrid' or 'jacobi'"),
         ({"scheme": "isph", "pressure_share": 1.5}, "pressure_share = 1.5"),
         ({"scheme": "wcsph", "algorithm": 2}, "algorithm = 2: of the scheme alsph, not of wcsph"),
-        ({"scheme": "sisph"}, "scheme = 'sisph': must be 'alsph', 'isph', 'wcsph' or 'edac'"),
+        ({"scheme": "sisph"}, "scheme = 'sisph': must be 'alsph', 'isph', 'explicit_isph', 'wcsph' or 'edac'"),
     ],
 )
 def test_what_is_not_the_schemes_is_refused(chosen, message):
@@ -66,14 +70,14 @@ def test_what_is_not_the_schemes_is_refused(chosen, message):
 
 
 def test_the_walls_pressure_goes_with_the_scheme():
-    own = {"alsph": "linear", "wcsph": "adami", "edac": "adami"}
+    own = {"alsph": "linear", "isph": "linear", "wcsph": "adami", "edac": "adami"}
     assert {name: Cylinder(scheme=name).wall_pressure for name in own} == own
     assert {name: Cylinder().replace(scheme=name).wall_pressure for name in own} == own
     assert Cylinder(scheme="edac").replace(scheme="alsph").wall_pressure == Cylinder().wall_pressure == "linear"
     assert Cylinder(scheme="edac").replace(scheme=None).wall_pressure == "linear"
     given = Cylinder(scheme="edac", wall_pressure="linear")
     assert given.replace(resolution=8).wall_pressure == given.replace(scheme="wcsph").wall_pressure == "linear"
-    sweeps = {"alsph": 4, "isph": 1}
+    sweeps = {"alsph": 4, "isph": 1, "explicit_isph": 0}
     assert {name: Cylinder().replace(scheme=name).projection_sweeps for name in sweeps} == sweeps
     assert Cylinder(scheme="isph").replace(scheme=None).projection_sweeps == 4
     assert Cylinder(projection_sweeps=2).replace(scheme="isph").projection_sweeps == 2
@@ -126,7 +130,7 @@ def test_vortices_decay_as_they_should(chosen):
     assert error < 0.007
 
 
-@pytest.mark.parametrize("chosen", [*SCHEMES[::3], *ISPH[:2]])
+@pytest.mark.parametrize("chosen", [*SCHEMES[::3], *ISPH[:2], ISPH[-1]])
 def test_runs_go_on_and_repeat_to_the_last_bit(chosen, tmp_path, small):
     case = small.replace(**chosen)
     whole = case.run(tmp_path / "whole", until=0.06, threads=2, progress=False)
@@ -137,9 +141,12 @@ def test_runs_go_on_and_repeat_to_the_last_bit(chosen, tmp_path, small):
     assert alsph.repeat(part.path, progress=False).same
     summary = whole.summary()
     if chosen["scheme"] == "isph":
-        cap = 200 if chosen in ISPH[:1] else 2
+        cap = 2 if "solver" in chosen else 200
         assert summary["iterations of a step"].endswith(f" of at most {cap}, then 1 projection sweeps")
         assert not any("Mach" in name for name in summary)
+    elif chosen["scheme"] == "explicit_isph":
+        assert summary["iterations of a step"] == "3 of at most 3, then 0 projection sweeps"
+        assert float(summary["artificial Mach number of the penalty"]) == pytest.approx(0.1, rel=0.1)
     else:
         assert summary["iterations of a step"] == "1"
         assert float(summary["artificial Mach number"]) == pytest.approx(0.13, rel=0.4)

@@ -35,22 +35,22 @@ const CHEBYSHEV_INTERVAL: [f64; 2] = [1.0 / 6.0, 1.15];
 const FALL: f64 = 0.99;
 const PATIENCE: usize = 20;
 
-/// Damping of Jacobi's iteration (Muta, Ramachandran and Negi 2020).
-const JACOBI_DAMPING: f64 = 0.5;
-
 /// How a solve ended.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Solution {
     pub iterations: usize,
-    /// ‖f + ∇²x‖ / ‖f‖.
+    /// ‖f + ∇²x‖ / ‖f‖, NaN where it was not looked at.
     pub residual: f64,
 }
 
 /// When a solve ends.
 #[derive(Clone, Copy, Debug)]
 pub struct Goal {
+    /// Residual that is small enough. With none to reach, all iterations are taken, and what the last of them leaves is not looked at.
     pub tolerance: f64,
     pub max_iterations: usize,
+    /// Damping of Jacobi's iteration.
+    pub damping: f64,
 }
 
 #[derive(Debug, Default)]
@@ -127,9 +127,15 @@ impl<const D: usize> Poisson<D> {
         let mut state = Krylov::default();
         let mut least = (solution.residual, 0);
         while solution.iterations < goal.max_iterations.min(least.1 + PATIENCE) && !solved(solution.residual) {
+            let last = goal.tolerance == 0.0 && solution.iterations + 1 == goal.max_iterations;
             match solver {
-                Solver::Jacobi => self.relax(system, x),
-                Solver::Multigrid => self.cycle_once(system, x),
+                Solver::Jacobi | Solver::Multigrid => {
+                    self.find_step(system, solver, goal.damping);
+                    parallel::for_each(system.frame.images.real(x), |i, x| *x += self.step[i]);
+                    if !last {
+                        self.renew_residual(system);
+                    }
+                }
                 Solver::Bicgstab => {
                     if !self.bicgstab(system, &mut state, x) {
                         break;
@@ -137,7 +143,7 @@ impl<const D: usize> Poisson<D> {
                 }
             }
             solution.iterations += 1;
-            solution.residual = relative(&self.residual);
+            solution.residual = if last && solver != Solver::Bicgstab { f64::NAN } else { relative(&self.residual) };
             if solution.residual < FALL * least.0 {
                 least = (solution.residual, solution.iterations);
             }
@@ -163,33 +169,28 @@ impl<const D: usize> Poisson<D> {
         }
     }
 
-    /// One step of the damped Jacobi iteration.
-    fn relax(&mut self, system: System<D>, x: &mut [f64]) {
-        let (residual, inverse) = (&self.residual, &self.inverse_diagonal);
-        parallel::for_each(&mut self.step, |i, step| *step = JACOBI_DAMPING * inverse[i] * residual[i]);
-        self.take_step(system, x);
-    }
-
-    /// Add one multigrid cycle's correction.
-    fn cycle_once(&mut self, system: System<D>, x: &mut [f64]) {
+    /// Set the step to the damped Jacobi iteration's, or to a multigrid cycle's correction.
+    fn find_step(&mut self, system: System<D>, solver: Solver, damping: f64) {
+        if solver == Solver::Jacobi {
+            let (residual, inverse) = (&self.residual, &self.inverse_diagonal);
+            return parallel::for_each(&mut self.step, |i, step| *step = damping * inverse[i] * residual[i]);
+        }
         let mut correction = std::mem::take(&mut self.correction);
         let residual = std::mem::take(&mut self.residual);
         self.precondition(system, &residual, &mut correction);
         (self.correction, self.residual) = (correction, residual);
         let correction = &self.correction;
         parallel::for_each(&mut self.step, |i, step| *step = correction[i]);
-        self.take_step(system, x);
     }
 
-    /// x += step, and what it does to the residual.
-    fn take_step(&mut self, system: System<D>, x: &mut [f64]) {
+    /// What the step does to the residual.
+    fn renew_residual(&mut self, system: System<D>) {
         let mut correction = std::mem::take(&mut self.correction);
         let step = &self.step;
         parallel::for_each(system.frame.images.real(&mut correction), |i, correction| *correction = step[i]);
         let mut product = std::mem::take(&mut self.product);
         self.multiply(system, &mut correction, &mut product);
         parallel::for_each(&mut self.residual, |i, residual| *residual -= product[i]);
-        parallel::for_each(system.frame.images.real(x), |i, x| *x += self.step[i]);
         (self.correction, self.product) = (correction, product);
     }
 

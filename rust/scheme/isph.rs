@@ -20,13 +20,22 @@ use crate::poisson::{Goal, Poisson, System};
 use crate::scheme::Scheme;
 use crate::scheme::projection::{Projection, Sweeps};
 use crate::scheme::viscous::Viscous;
-use crate::settings::{Eigenvalues, ProjectionSettings, Settings, TimeStepLimits};
+use crate::settings::{Eigenvalues, ProjectionSettings, Settings, Solver, TimeStepLimits};
 use crate::shifting::measures_divergence;
+
+/// Damping of Jacobi's iteration (Muta, Ramachandran and Negi 2020), and of several of its steps in place of a solve.
+const JACOBI_DAMPING: f64 = 0.5;
+const SEVERAL_DAMPING: f64 = 0.8;
 
 /// The fields of one step beside those of the particles, real particles and, where they have neighbours that read them, images.
 #[derive(Debug)]
 pub struct Isph<const D: usize> {
-    own: ProjectionSettings,
+    /// β.
+    pressure_share: f64,
+    solver: Solver,
+    goal: Goal,
+    /// J Δx²/a of an explicit pressure, whose waves have the square of the speed J Δx²/(a Δt²); NaN of a solved one.
+    relaxed: f64,
     largest: Eigenvalues,
     sweeps: Sweeps,
     viscous: Viscous<D>,
@@ -50,9 +59,27 @@ pub struct Isph<const D: usize> {
 
 impl<const D: usize> Isph<D> {
     pub fn new(settings: &Settings, own: ProjectionSettings) -> Self {
+        let ProjectionSettings { pressure_share, solver, tolerance, max_solver_iterations } = own;
+        let goal = Goal { tolerance, max_iterations: max_solver_iterations, damping: JACOBI_DAMPING };
+        Self::with(settings, pressure_share, solver, goal, f64::NAN)
+    }
+
+    /// With so many steps of Jacobi's iteration from the old pressure in place of a solve (Hosseini, Manzari and Hannani 2007; Rafiee and
+    /// Thiagarajan 2009; Barcarolo et al. 2012): as waves of the speed √(J/a) Δx/Δt, whose divergence a step takes off.
+    pub fn explicit(settings: &Settings, sweeps: usize) -> Self {
+        let damping = if sweeps == 1 { 1.0 } else { SEVERAL_DAMPING };
+        let relaxed = sweeps as f64 * settings.particle_spacing.powi(2) / settings.laplacian_diagonal();
+        let goal = Goal { tolerance: 0.0, max_iterations: sweeps, damping };
+        Self::with(settings, 0.0, Solver::Jacobi, goal, relaxed)
+    }
+
+    fn with(settings: &Settings, pressure_share: f64, solver: Solver, goal: Goal, relaxed: f64) -> Self {
         let largest = settings.largest_eigenvalues();
         Self {
-            own,
+            pressure_share,
+            solver,
+            goal,
+            relaxed,
             largest,
             sweeps: Sweeps::new(settings, largest),
             viscous: Viscous::new(settings),
@@ -76,7 +103,7 @@ impl<const D: usize> Isph<D> {
 
     /// u*. Buffers and solids keep their velocities.
     fn predict_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
-        let share = self.own.pressure_share;
+        let share = self.pressure_share;
         self.extend_pressure(step.settings, flow);
         let Flow { particles, frame, body_force, .. } = flow;
         frame.images.blank(&mut self.base, particles.len());
@@ -148,13 +175,12 @@ impl<const D: usize> Scheme<D> for Isph<D> {
         self.predict_velocity(step, flow);
         self.form_source(step, flow);
         let Flow { particles, frame, .. } = &mut *flow;
-        let share = self.own.pressure_share;
+        let share = self.pressure_share;
         frame.images.blank(&mut self.change, particles.len());
         parallel::for_each(frame.images.real(&mut self.change), |i, change| *change = (1.0 - share) * particles.pressure[i]);
-        self.poisson.begin(step.settings, particles, frame, self.own.solver);
+        self.poisson.begin(step.settings, particles, frame, self.solver);
         let system = System { settings: step.settings, particles, frame, largest: self.largest };
-        let goal = Goal { tolerance: self.own.tolerance, max_iterations: self.own.max_solver_iterations };
-        let solution = self.poisson.solve(system, self.own.solver, goal, &mut self.source, &mut self.change);
+        let solution = self.poisson.solve(system, self.solver, self.goal, &mut self.source, &mut self.change);
         self.correct_velocity(step, flow);
         let solenoidal = &self.solenoidal;
         if step.settings.projection_sweeps > 0 {
@@ -179,7 +205,7 @@ impl<const D: usize> Scheme<D> for Isph<D> {
         particles.pressure[i] + self.projection.unkept(particles, i)
     }
 
-    fn penalty(&self, _: f64) -> f64 {
-        f64::NAN
+    fn penalty(&self, time_step: f64) -> f64 {
+        self.relaxed / time_step
     }
 }

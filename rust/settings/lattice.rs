@@ -28,6 +28,12 @@ impl Settings {
         self.largest_over_waves(eigenvalue)
     }
 
+    /// What the value of a particle itself counts in the negative compact Laplacian, times Δx².
+    pub fn laplacian_diagonal(&self) -> f64 {
+        let (slopes, trace) = self.lattice_slopes();
+        -2.0 * (self.dimensions as f64 + 2.0) / (2.0 + trace) * slopes.iter().map(|(_, slope)| slope).sum::<f64>()
+    }
+
     /// The same of −∇·∇, the divergence of the gradient: three to five times smaller, since both operators miss short waves.
     pub fn largest_projection_eigenvalue(&self) -> f64 {
         let (slopes, trace) = self.lattice_slopes();

@@ -1,6 +1,6 @@
 //! The stability law of the time step, and the penalty that goes with it.
 
-use super::{Eigenvalues, Settings, WallVelocity};
+use super::{Eigenvalues, SchemeSettings, Settings, WallVelocity};
 
 /// c₀Δt over what a lattice's shortest waves bear.
 const ACOUSTIC_SHARE: f64 = 0.45;
@@ -12,7 +12,8 @@ pub struct TimeStepLimits {
     pub courant: f64,
     /// r_AL Δt λ_max < 2 for a given C_BV (method section 3).
     pub penalty: f64,
-    /// A weakly compressible scheme's: (c₀ + u_max) Δt below a share of what a lattice's shortest waves bear, 2 Δx/√λ.
+    /// A weakly compressible scheme's: (c₀ + u_max) Δt below a share of what a lattice's shortest waves bear, 2 Δx/√λ. That of explicit ISPH,
+    /// whose waves have the speed √(J/a) Δx/Δt with J sweeps, a being the Laplacian's diagonal times Δx²: u_max below its share of that.
     pub acoustic: f64,
     /// 0.125 h²/ν.
     pub viscous: f64,
@@ -30,11 +31,22 @@ impl Settings {
         TimeStepLimits {
             courant: self.courant.map_or(f64::INFINITY, |courant| courant * spacing / velocity_max),
             penalty: self.penalty_constant.map_or(f64::INFINITY, |constant| spacing / wave(constant)),
-            acoustic: self.scheme.sound_speed().map_or(f64::INFINITY, |sound_speed| {
-                ACOUSTIC_SHARE * 2.0 * spacing / (largest.projection.sqrt() * (sound_speed + velocity_max))
-            }),
+            acoustic: self.acoustic_limit(velocity_max, largest),
             viscous: self.viscous_limit() * h * h / self.kinematic_viscosity,
             body_force: 0.25 * (h / gravity).sqrt(),
+        }
+    }
+
+    fn acoustic_limit(&self, velocity_max: f64, largest: Eigenvalues) -> f64 {
+        let spacing = self.particle_spacing;
+        match self.scheme {
+            SchemeSettings::Alsph | SchemeSettings::Isph(_) => f64::INFINITY,
+            SchemeSettings::ExplicitIsph { sweeps, mach_number } => {
+                mach_number * (sweeps as f64 / self.laplacian_diagonal()).sqrt() * spacing / velocity_max
+            }
+            SchemeSettings::Wcsph { sound_speed, .. } | SchemeSettings::Edac { sound_speed, .. } => {
+                ACOUSTIC_SHARE * 2.0 * spacing / (largest.projection.sqrt() * (sound_speed + velocity_max))
+            }
         }
     }
 

@@ -178,10 +178,14 @@ impl Settings {
     fn validate_scheme(&self) -> Result<()> {
         match self.scheme {
             SchemeSettings::Alsph => return Ok(()),
-            SchemeSettings::Isph(own) => {
-                own.validate()?;
-                if self.derivative_frame == DerivativeFrame::Updated {
-                    return Err(setting("derivative_frame", "must be \"initial\" or \"midpoint\" in the scheme isph"));
+            SchemeSettings::Isph(own) => own.validate()?,
+            SchemeSettings::ExplicitIsph { sweeps, mach_number } => {
+                if !(1.0..=MOST_PASSES).contains(&(sweeps as f64)) {
+                    return Err(setting("scheme.sweeps", format!("must lie in 1..{MOST_PASSES}, not {sweeps}")));
+                }
+                if !(mach_number > 0.0 && mach_number <= 1.0) {
+                    let problem = format!("must be a positive number up to 1, not {mach_number}");
+                    return Err(setting("scheme.mach_number", problem));
                 }
             }
             SchemeSettings::Wcsph { sound_speed, diffusion_coefficient, .. }
@@ -194,6 +198,10 @@ impl Settings {
                     return Err(setting("scheme.diffusion_coefficient", problem));
                 }
             }
+        }
+        let projects = matches!(self.scheme, SchemeSettings::Isph(_) | SchemeSettings::ExplicitIsph { .. });
+        if projects && self.derivative_frame == DerivativeFrame::Updated {
+            return Err(setting("derivative_frame", "must be \"initial\" or \"midpoint\" in this scheme"));
         }
         if self.velocity_laplacian == VelocityLaplacian::Vector {
             return Err(setting("velocity_laplacian", "must be \"scalar\" but in the scheme alsph"));

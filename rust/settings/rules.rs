@@ -14,6 +14,13 @@ pub enum SchemeSettings {
     Alsph,
     /// Projection ISPH.
     Isph(ProjectionSettings),
+    /// ISPH whose Poisson equation gets a few steps of Jacobi's iteration from the old pressure, whatever they leave.
+    ExplicitIsph {
+        /// Steps of the iteration.
+        sweeps: usize,
+        /// Largest artificial Mach number, which bounds the step.
+        mach_number: f64,
+    },
     /// Weakly compressible SPH.
     Wcsph {
         /// c₀.
@@ -29,16 +36,6 @@ pub enum SchemeSettings {
         /// α.
         diffusion_coefficient: f64,
     },
-}
-
-impl SchemeSettings {
-    /// c₀ of a weakly compressible scheme.
-    pub fn sound_speed(&self) -> Option<f64> {
-        match *self {
-            Self::Alsph | Self::Isph(_) => None,
-            Self::Wcsph { sound_speed, .. } | Self::Edac { sound_speed, .. } => Some(sound_speed),
-        }
-    }
 }
 
 /// What projection ISPH has of its own.

@@ -419,6 +419,9 @@ class Case(Driven):
         """
         if self.scheme == "isph":
             return math.inf
+        if self.scheme == "explicit_isph":
+            share = self.expected_time_step() / self.time_step_limits()["acoustic"]
+            return float((share * self.settings()["scheme"]["mach_number"]) ** -2)
         if self.is_weakly_compressible:
             return float((self.settings()["scheme"]["sound_speed"] / self.velocity_max) ** 2)
         if self.penalty_constant is not None:

@@ -135,6 +135,7 @@ class Driven(Dimensional):
     def sliding(self, position: FloatArray, time: float) -> ArrayLike | None:
         """Return the velocity of the surfaces of bodies that stay in place, which is asked for in every step.
 
+        The positions are those of the surface above each solid particle.
         By default it is ``surface_velocity``, if that is given. It takes the place of the ``velocity`` of those of
         :meth:`bodies` that do not move. Arguments and velocities are as those of :meth:`inflow`.
         """

@@ -40,7 +40,7 @@ def _goes_with(scheme: Any) -> dict[str, Any]:
     """Return what goes with a scheme where nothing else is given."""
     return {
         "wall_pressure": "adami" if scheme in tuple(DIFFUSION) else "linear",
-        "projection_sweeps": 1 if scheme == "isph" else 4,
+        "projection_sweeps": {"isph": 1, "explicit_isph": 0}.get(scheme, 4),
     }
 
 
@@ -64,14 +64,15 @@ def superseded(changes: Mapping[str, Any], before: Mapping[str, Any]) -> tuple[s
     return ("courant", *others) if _as_in_the_paper(changes) else others
 
 
-SCHEMES = ("alsph", "isph", "wcsph", "edac")
+SCHEMES = ("alsph", "isph", "explicit_isph", "wcsph", "edac")
 
 OWN = {
     "penalty_constant": ("alsph",),
     "solver": ("isph",),
     "solver_tolerance": ("isph",),
-    "solver_iterations": ("isph",),
+    "solver_iterations": ("isph", "explicit_isph"),
     "pressure_share": ("isph",),
+    "mach_number": ("explicit_isph",),
     "sound_speed": ("wcsph", "edac"),
     "density_diffusion": ("wcsph",),
     "diffusion_coefficient": ("wcsph", "edac"),
@@ -88,10 +89,10 @@ class Method(Parameters):
     in_space: ClassVar[int] = 2
     """Number of space dimensions of a case without a parameter for it."""
 
-    scheme: Literal["alsph", "isph", "wcsph", "edac"] | None = Field(
+    scheme: Literal["alsph", "isph", "explicit_isph", "wcsph", "edac"] | None = Field(
         default=None,
-        description="augmented Lagrangian SPH, projection ISPH, weakly compressible SPH, or entropically damped "
-        "artificial compressibility; alsph if not given",
+        description="augmented Lagrangian SPH, projection ISPH, explicit ISPH, weakly compressible SPH, or "
+        "entropically damped artificial compressibility; alsph if not given",
     )
     sound_speed: float | None = Field(
         default=None, gt=0, description="speed of sound of wcsph and edac, 10 if not given [U]"
@@ -116,7 +117,11 @@ class Method(Parameters):
         description="relative residual that a solve of isph ends with, 1e-3 if not given [-]",
     )
     solver_iterations: int | None = Field(
-        default=None, ge=1, le=1000, description="cap of the iterations of a solve of isph, 200 if not given [-]"
+        default=None,
+        ge=1,
+        le=1000,
+        description="cap of the iterations of a solve of isph, 200 if not given; iterations of explicit_isph, 1 if "
+        "not given [-]",
     )
     pressure_share: float | None = Field(
         default=None,
@@ -124,6 +129,12 @@ class Method(Parameters):
         le=1,
         description="how much of the old pressure isph's predicted velocity has felt, 0.9 if not given; "
         "0: the pressure is solved anew in every step [-]",
+    )
+    mach_number: float | None = Field(
+        default=None,
+        gt=0,
+        le=1,
+        description="artificial Mach number that the step of explicit_isph keeps, 0.1 if not given [-]",
     )
     courant: float | None = Field(
         default=None,
@@ -162,7 +173,8 @@ class Method(Parameters):
         default=4,
         ge=0,
         le=1000,
-        description="projection sweeps after the iterations of a step, 0 in the paper; 1 if not given with isph [-]",
+        description="projection sweeps after the iterations of a step, 0 in the paper; 1 if not given with isph, "
+        "0 with explicit_isph [-]",
     )
     sweep_weights: Literal["chebyshev", "equal"] | None = Field(
         default=None,
@@ -281,6 +293,8 @@ class Method(Parameters):
                 "tolerance": 1e-3 if self.solver_tolerance is None else self.solver_tolerance,
                 "max_solver_iterations": self.most_iterations,
             }
+        if self.scheme == "explicit_isph":
+            return {"kind": self.scheme, "sweeps": self.most_iterations, "mach_number": self.mach_number or 0.1}
         if not self.is_weakly_compressible:
             return {"kind": "alsph"}
         given = self.diffusion_coefficient
@@ -295,16 +309,19 @@ class Method(Parameters):
 
     @property
     def most_iterations(self) -> int:
-        """Cap of the iterations of a step, with isph those of its solver."""
-        return self.solver_iterations or 200 if self.scheme == "isph" else self.max_iterations
+        """Cap of the iterations of a step, those of the solver where there is one."""
+        if self.scheme == "isph":
+            return self.solver_iterations or 200
+        return self.solver_iterations or 1 if self.scheme == "explicit_isph" else self.max_iterations
 
     @property
     def passes(self) -> int:
         """About how often a step goes over all pairs of particles."""
         if self.is_weakly_compressible:
             return 7
-        if self.scheme == "isph":
-            return 30 + 2 * self.projection_sweeps
+        if self.scheme in ("isph", "explicit_isph"):
+            iteration = {"multigrid": 4, "bicgstab": 8}.get(self._scheme_settings().get("solver", ""), 1)
+            return 9 + iteration * min(self.most_iterations, 4) + 2 * self.projection_sweeps
         iteration = 8 if self.algorithm in (1, "original") else 4
         return 5 + iteration * self.max_iterations + 2 * self.projection_sweeps
 

@@ -161,16 +161,7 @@ class TaylorCouette(Case):
         late = history["time"] >= 0.75 * history["time"][-1]
         parts = [[f"{body.name}_{part}_torque" for part in ("pressure", "viscous")] for body in self.bodies()]
         recorded = np.array([sum(history[name][late].mean() for name in names) for names in parts])
-        return [(recorded + self._rotation).tolist(), self.torques(history["time"][late]).mean(axis=1).tolist()]
-
-    @property
-    def _rotation(self) -> FloatArray:
-        """Torques (2,) that the recorded ones lack: those are of ∇u, whose transpose acts on turning surfaces, too.
-
-        It is -2μΩ times the area that the surface goes around, whatever the flow.
-        """
-        speeds = np.array([-1.0, self.outer_velocity])
-        return 2 * np.pi / self.reynolds * speeds * (self.inner_radius, self.outer_radius)
+        return [recorded.tolist(), self.torques(history["time"][late]).mean(axis=1).tolist()]
 
     def profiles(self, run: Record) -> list[Profile]:
         """Return the particles' velocities around the axis in the last snapshot over their distance from it."""
