@@ -248,9 +248,9 @@ class Method(Parameters):
             strain = 0.25 if values.get("dimensions", cls.in_space) == 3 else 0.75  # in 3-D more neighbours push
             kind = values.get("shifting")
             values = values | {"shift_coefficient": strain if kind in (None, "strain") else 0.04}
-        values = values | {
-            name: value for name, value in _goes_with(values.get("scheme")).items() if values.get(name) is None
-        }
+        for name, value in _goes_with(values.get("scheme")).items():
+            if values.get(name, value) is None or (name not in values and value != cls.model_fields[name].default):
+                values = values | {name: value}
         if values.get("courant") is not None:
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -71,7 +72,10 @@ class Fields:
         if len(self.times) == 0:
             raise RunFolderError(f"{self.path}: no snapshot yet; wait for the first one or lower output_interval")
         index = len(self.times) - 1 if time is None else int(np.abs(self.times - time).argmin())
-        return reading.snapshot(self.path / "particles.vtkhdf", index, self.config.case.checked_domain)
+        domain = None
+        with suppress(RunFolderError):  # of a case that is not known the particles can be read all the same
+            domain = self.config.case.checked_domain
+        return reading.snapshot(self.path / "particles.vtkhdf", index, domain)
 
     @cached_property
     def probes(self) -> Probes:
