@@ -362,7 +362,8 @@ class Simulation:
         velocity
             An array (d,) or, in the order of :meth:`inflow_position`, (m, d), which the particles keep and hand on to
             those that follow them [U]; or a function of their positions (m, d) [D] and the time [D/U] that returns such
-            an array and is called before every step. The rule of a case is better its :meth:`alsph.cases.Case.inflow`.
+            an array and is called before every step. The rule of a case is better its
+            :meth:`~alsph.cases.driven.Driven.inflow`.
 
         Raises
         ------
@@ -399,8 +400,9 @@ class Simulation:
 
         Notes
         -----
-        The rules of a case are better its :meth:`alsph.cases.Case.forcing` and :meth:`alsph.cases.Case.sliding`. They
-        are called in a thread of the engine, and cannot use the simulation.
+        The rules of a case are better its :meth:`~alsph.cases.driven.Driven.forcing` and
+        :meth:`~alsph.cases.driven.Driven.sliding`. They are called in a thread of the engine, and cannot use the
+        simulation.
         """
         if callable(sliding) and all(body["velocity"] is not None for body in self.problem.settings["bodies"]):
             raise ConfigError(
