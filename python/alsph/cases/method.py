@@ -40,7 +40,7 @@ def _goes_with(scheme: Any) -> dict[str, Any]:
     """Return what goes with a scheme where nothing else is given."""
     return {
         "wall_pressure": "adami" if scheme in tuple(DIFFUSION) else "linear",
-        "projection_sweeps": {"isph": 1, "explicit_isph": 0}.get(scheme, 4),
+        "projection_sweeps": 1 if scheme == "isph" else 0 if scheme == "explicit_isph" else 4,
     }
 
 
