@@ -90,11 +90,9 @@ impl<const D: usize> Operator<D> for GradientAndLaplacian<'_> {
             },
         );
         let corrections = near.corrections();
-        let (gradient, laplacian, linear) = (corrected(gradient, &corrections), laplacian.store(), vectors(linear));
-        std::array::from_fn(|lane| {
-            let Correction { laplacian: factor, asymmetry, .. } = &corrections[lane];
-            (gradient[lane], factor * (laplacian[lane] + asymmetry.dot(&linear[lane])))
-        })
+        let gradient = corrected(gradient, &corrections);
+        let laplacian = corrected_laplacian(laplacian, linear, &corrections);
+        std::array::from_fn(|lane| (gradient[lane], laplacian[lane]))
     }
 }
 
@@ -113,12 +111,7 @@ impl<const D: usize> Operator<D> for Laplacian<'_> {
                 add_product(&mut linear, difference, r_ij);
             },
         );
-        let corrections = near.corrections();
-        let (laplacian, linear) = (laplacian.store(), vectors(linear));
-        std::array::from_fn(|lane| {
-            let Correction { laplacian: factor, asymmetry, .. } = &corrections[lane];
-            factor * (laplacian[lane] + asymmetry.dot(&linear[lane]))
-        })
+        corrected_laplacian(laplacian, linear, &near.corrections())
     }
 }
 
@@ -135,12 +128,7 @@ impl<const D: usize> Operator<D> for LaplacianDiagonal {
                 add_product(&mut first, slope, r_ij);
             },
         );
-        let corrections = near.corrections();
-        let (sum, first) = (sum.store(), vectors(first));
-        std::array::from_fn(|lane| {
-            let Correction { laplacian: factor, asymmetry, .. } = &corrections[lane];
-            -factor * (sum[lane] + asymmetry.dot(&first[lane]))
-        })
+        corrected_laplacian(sum, first, &near.corrections()).map(|weight| -weight)
     }
 }
 
@@ -209,6 +197,23 @@ fn uncorrected_gradient<V: Lanes, const D: usize>(near: &mut impl Neighbours<V, 
 fn corrected<V: Lanes, const D: usize>(sum: [V; D], corrections: &[Correction<D>; LANES]) -> [Vector<D>; LANES] {
     let sum = vectors(sum);
     std::array::from_fn(|lane| corrections[lane].inverse * sum[lane])
+}
+
+/// A scalar Laplacian, from Σ slope (f_j − f_i) and Σ slope (f_j − f_i) r_ij.
+#[inline(always)]
+fn corrected_laplacian<V: Lanes, const D: usize>(
+    sum: V,
+    linear: [V; D],
+    corrections: &[Correction<D>; LANES],
+) -> [f64; LANES] {
+    let (sum, linear) = (sum.store(), vectors(linear));
+    std::array::from_fn(
+        #[inline(always)]
+        |lane| {
+            let Correction { laplacian: factor, asymmetry, .. } = &corrections[lane];
+            factor * (sum[lane] + asymmetry.dot(&linear[lane]))
+        },
+    )
 }
 
 /// Σ_kl α⁻¹_kl T_kl.

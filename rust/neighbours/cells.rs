@@ -50,6 +50,12 @@ impl Cells {
     }
 }
 
+/// The number of the cell at `at`, of `counts` in each direction, the first direction fastest.
+#[inline(always)]
+pub fn flat<const D: usize>(at: [usize; D], counts: [usize; D]) -> usize {
+    at.iter().zip(&counts).rev().fold(0, |flat, (&at, &n)| flat * n + at)
+}
+
 /// Cells that are sorted one after the other.
 const CELLS: usize = 1024;
 

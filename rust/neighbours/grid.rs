@@ -2,7 +2,7 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
-use crate::neighbours::cells::Cells;
+use crate::neighbours::cells::{Cells, flat};
 use std::ops::Range;
 
 /// Cells that the search radius reaches to either side: narrow cells fit the sphere closer than wide ones.
@@ -84,7 +84,7 @@ impl<const D: usize> Grid<D> {
     fn sort(&mut self, points: &[Vector<D>], keys: &[u64]) {
         let mut cell_of = std::mem::take(&mut self.cell_of);
         cell_of.resize(points.len(), 0);
-        parallel::for_each(&mut cell_of, |i, cell| *cell = self.flat(self.cell(&points[i])) as u32);
+        parallel::for_each(&mut cell_of, |i, cell| *cell = flat(self.cell(&points[i]), self.cells) as u32);
         self.listed.sort(&cell_of, self.cells.iter().product(), keys);
         for (axis, coordinates) in self.coordinates.iter_mut().enumerate() {
             coordinates.resize(points.len(), 0.0);
@@ -148,7 +148,7 @@ impl<const D: usize> Grid<D> {
     /// The points in cells `first` to `end` of a row.
     #[inline(always)]
     fn run(&self, row: [usize; D], [first, end]: [usize; 2]) -> Run<'_, D> {
-        let start = self.flat(row);
+        let start = flat(row, self.cells);
         let range = self.listed.range(start + first, start + end);
         Run {
             indices: &self.listed.items[range.clone()],
@@ -163,10 +163,5 @@ impl<const D: usize> Grid<D> {
             let cell = ((point[axis] - self.origin[axis]) * self.inverse_width) as usize;
             cell.saturating_sub(self.first[axis]).min(self.cells[axis] - 1)
         })
-    }
-
-    #[inline(always)]
-    fn flat(&self, cell: [usize; D]) -> usize {
-        cell.iter().zip(&self.cells).rev().fold(0, |flat, (&c, &n)| flat * n + c)
     }
 }

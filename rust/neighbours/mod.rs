@@ -6,6 +6,6 @@ mod grid;
 mod list;
 
 pub use brute_force::brute_force_neighbours;
-pub use cells::Cells;
+pub use cells::{Cells, flat};
 pub use grid::Grid;
 pub use list::{Cluster, Entry, NeighbourList, Row, RowMut, Visit, VisitMut};

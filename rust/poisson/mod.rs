@@ -6,6 +6,7 @@
 //! All sums are exact, so that neither the number of threads nor the order of the particles changes a bit.
 
 mod multigrid;
+mod row;
 
 use crate::base::{exact_sums, parallel};
 use crate::boundary::{PressureRule, conditions, extrapolate_scalar};
@@ -15,16 +16,7 @@ use crate::particles::Particles;
 use crate::settings::{Eigenvalues, Settings, Solver};
 use multigrid::Multigrid;
 
-/// What row of the system a particle has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Row {
-    /// −∇²x = f.
-    Solved,
-    /// x = 0.
-    Zero,
-    /// None: x is that of the fluid around.
-    None,
-}
+pub use row::Row;
 
 /// Steps of Chebyshev's iteration that a multigrid cycle ends with, and the interval of the eigenvalues that it damps over λ_max: what
 /// the background grid does not see, and what disordered particles have beyond the lattice's.

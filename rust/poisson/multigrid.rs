@@ -6,9 +6,9 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
-use crate::neighbours::Cells;
+use crate::neighbours::{Cells, flat};
 use crate::particles::Particles;
-use crate::poisson::Row;
+use crate::poisson::row::Row;
 use crate::settings::{Boundary, Settings};
 
 /// Width of the cells of the finest grid over Δx.
@@ -122,7 +122,7 @@ impl<const D: usize> Multigrid<D> {
     fn cell(&self, position: &Vector<D>) -> usize {
         let counts = self.levels[0].counts;
         let cell = (position - self.lower).component_div(&self.width);
-        (0..D).rev().fold(0, |flat, axis| flat * counts[axis] + (cell[axis].max(0.0) as usize).min(counts[axis] - 1))
+        flat(std::array::from_fn(|axis| (cell[axis].max(0.0) as usize).min(counts[axis] - 1)), counts)
     }
 
     /// Set `correction` to about the solution of −∇²x = `residual` by one V-cycle. Of a `closed` domain the source has no mean.
@@ -362,9 +362,4 @@ fn place<const D: usize>(cell: usize, counts: [usize; D]) -> [usize; D] {
         rest /= n;
         at
     })
-}
-
-#[inline(always)]
-fn flat<const D: usize>(at: [usize; D], counts: [usize; D]) -> usize {
-    at.iter().zip(&counts).rev().fold(0, |flat, (&at, &n)| flat * n + at)
 }
