@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time as clock
 
 import alsph
@@ -18,7 +19,7 @@ from alsph.cases import Cylinder, TaylorGreen
 from alsph.config import Config, RunSettings
 from alsph.engine.simulation import Simulation, next_multiple
 from alsph.errors import ConfigError, RunFolderError, SolverError, WalltimeError
-from alsph.folder import checkpoint, reading
+from alsph.folder import checkpoint, durable, reading
 from alsph.folder.run_folder import RunFolder
 from alsph.running.control import Control, seconds_of
 from alsph.running.start import complete, resume, start
@@ -111,6 +112,7 @@ def test_a_run_goes_on_when_nobody_reads_its_progress(tmp_path, small):
 import alsph.running.progress
 alsph.running.progress.PLAIN_SECONDS = 0.0
 import sys
+import threading
 sys.argv = ["alsph", "run", {str(file)!r}, "-o", {str(path)!r}]
 from alsph.cli import main
 main()
@@ -171,6 +173,26 @@ def test_a_second_process_is_refused(tmp_path, small):
     process.kill()
     process.wait()
     assert resume(path, until=RunFolder(path).read_checkpoint().state["time"] + 0.02, progress=False)
+
+
+def test_files_that_come_and_go_are_no_special_files(tmp_path):
+    """As the second process looks at the folder, the first replaces its checkpoint."""
+    path = tmp_path / "checkpoint.h5"
+    done = threading.Event()
+
+    def replace():
+        while not done.is_set():
+            path.touch()
+            path.unlink()
+
+    other = threading.Thread(target=replace)
+    other.start()
+    try:
+        for _ in range(3000):
+            durable.check_target(path)
+    finally:
+        done.set()
+        other.join()
 
 
 def test_a_folder_that_has_moved_goes_on(tmp_path, small):

@@ -12,6 +12,7 @@ import hashlib
 import io
 import os
 import re
+import stat
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -42,6 +43,18 @@ def replacing(path: Path, keep: Path | None = None) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def is_plain(path: Path, *kinds: Callable[[int], bool]) -> bool:
+    """Whether what has that path is of one of those kinds, and no link to it, or there is nothing.
+
+    It is looked at once: a file that another process has just put into its place was never a special one.
+    """
+    try:
+        mode = path.lstat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return True
+    return any(kind(mode) for kind in kinds)
+
+
 def check_target(path: Path) -> None:
     """Refuse to write a file through a link or into a device, which may lie anywhere.
 
@@ -50,7 +63,7 @@ def check_target(path: Path) -> None:
     RunFolderError
         If there is one with that path.
     """
-    if path.is_symlink() or (path.exists() and not path.is_file()):
+    if not is_plain(path, stat.S_ISREG):
         raise RunFolderError(f"{path}: a link or a special file, and alsph does not write through it; remove it first")
 
 

@@ -11,6 +11,7 @@ import os
 import platform
 import re
 import shutil
+import stat
 import time as clock
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -29,7 +30,7 @@ from alsph.engine.prescribed import Prescription
 from alsph.errors import DamagedError, RunFolderError
 from alsph.folder import checkpoint, reading, vtkhdf
 from alsph.folder.checkpoint import Checkpoint
-from alsph.folder.durable import flush, replacing
+from alsph.folder.durable import flush, is_plain, replacing
 from alsph.folder.reading import DAMAGE
 from alsph.text import printable
 
@@ -135,7 +136,7 @@ class RunFolder:
     def _check_entries(self) -> None:
         """Refuse a folder through which files elsewhere would be written."""
         for entry in self.path.iterdir():
-            if entry.is_symlink() or not (entry.is_file() or entry.is_dir()):
+            if not is_plain(entry, stat.S_ISREG, stat.S_ISDIR):
                 raise RunFolderError(
                     f"{entry}: a link or a special file; alsph does not write to a folder that has one"
                 )
