@@ -187,7 +187,7 @@ fn divergence(settings: &Settings, set: &Set<2>, velocity: impl Fn(&Vector<2>) -
     }
     let own = set.apply(Divergence(&field));
     let mut all = own.clone();
-    add_wall_flux(settings, particles, frame, &field, &mut Vec::new(), &mut all);
+    add_wall_flux(settings, particles, frame, |j| field[j], &mut Vec::new(), &mut all);
     [own, all]
 }
 

@@ -3,6 +3,9 @@
 //! ∇·u of the fluid with solids that show the wall's velocity sees the jump of the normal velocity at the surface, smeared over the support:
 //! half of it on fluid particles, half on solid ones, which have no equations. A Poisson equation whose right-hand side lacks that half makes
 //! half of the pressure gradient that would stop the fluid at the wall. So each solid hands what it sees to the fluid around.
+//!
+//! Solids at corners do not: one normal does not tell to which surface a flux belongs, and at the corners of a lid there is none to
+//! be told.
 
 use crate::base::{Vector, parallel};
 use crate::boundary::average::for_each_weighted;
@@ -11,24 +14,31 @@ use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 use rayon::prelude::*;
 
+/// A surface that turns by so much (the cosine) within so many spacings has a corner.
+const TURN: f64 = 0.72;
+const CORNER_REACH: f64 = 2.5;
+
 /// Add to `divergence`, that of `velocity` at the real particles, what solid particles see of it: each gives the integral over its volume to
 /// the flowing particles around, in proportion to the kernel. `handed` is memory to be used.
 pub fn add_wall_flux<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
     frame: &Frame<D>,
-    velocity: &[Vector<D>],
+    velocity: impl Fn(usize) -> Vector<D> + Sync,
     handed: &mut Vec<f64>,
     divergence: &mut [f64],
 ) {
     let stencil = &frame.stencil;
     let is_solid = |i: &usize| particles.kind[*i] == ParticleKind::Solid;
     let share = |s: usize| {
+        if is_at_corner(settings, particles, frame, s) {
+            return 0.0;
+        }
         let (row, lane) = stencil.neighbours.row(s);
         let (mut total, mut mean) = (0.0, Vector::zeros());
         for_each_weighted(settings, stencil, s, row.flowing_seen(lane), |j, weight, _| {
             total += weight;
-            mean += velocity[j] * weight;
+            mean += velocity(j) * weight;
         });
         if total == 0.0 {
             return 0.0;
@@ -36,8 +46,8 @@ pub fn add_wall_flux<const D: usize>(
         // Along the wall the fluid slides: there its own mean is what others differ from, else a corner's cut support would count as a flux.
         mean /= total;
         let normal = &particles.normal[s];
-        let wall = mean + normal * (velocity[s] - mean).dot(normal);
-        let flux = |j: usize| (velocity[j] - wall).dot(&(stencil.position[s] - stencil.position[j]));
+        let wall = mean + normal * (velocity(s) - mean).dot(normal);
+        let flux = |j: usize| (velocity(j) - wall).dot(&(stencil.position[s] - stencil.position[j]));
         let flux = row.flowing().iter().map(|entry| flux(entry.j()) * entry.slope(lane)).sum::<f64>();
         stencil.volume[s] * flux / total
     };
@@ -57,4 +67,16 @@ pub fn add_wall_flux<const D: usize>(
             *divergence += sum / stencil.volume[i];
         }
     });
+}
+
+/// Whether the surface above solid `s` turns sharply nearby.
+fn is_at_corner<const D: usize>(settings: &Settings, particles: &Particles<D>, frame: &Frame<D>, s: usize) -> bool {
+    let Particles { normal, depth, .. } = particles;
+    let surface = |s: usize| frame.stencil.position[s] + normal[s] * depth[s];
+    let (here, reach) = (surface(s), CORNER_REACH * settings.particle_spacing);
+    let (row, lane) = frame.stencil.neighbours.row(s);
+    row.solid_seen(lane).any(|(entry, _)| {
+        let k = entry.j();
+        normal[k].dot(&normal[s]) < TURN && (surface(k) - here).norm_squared() < reach * reach
+    })
 }

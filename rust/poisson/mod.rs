@@ -129,7 +129,7 @@ impl<const D: usize> Poisson<D> {
                     }
                 }
                 Solver::Bicgstab => {
-                    if !self.bicgstab(system, &mut state, x) {
+                    if !self.bicgstab(system, &mut state, goal.tolerance * scale, x) {
                         break;
                     }
                 }
@@ -217,7 +217,7 @@ impl<const D: usize> Poisson<D> {
     }
 
     /// One step of BiCGSTAB (van der Vorst 1992), preconditioned; false where it cannot go on.
-    fn bicgstab(&mut self, system: System<D>, state: &mut Krylov, x: &mut [f64]) -> bool {
+    fn bicgstab(&mut self, system: System<D>, state: &mut Krylov, small: f64, x: &mut [f64]) -> bool {
         let count = self.residual.len();
         if state.steps == 0 {
             self.shadow.copy_from_slice(&self.residual);
@@ -238,21 +238,25 @@ impl<const D: usize> Poisson<D> {
         let mut ends = !alpha.is_finite();
         if !ends {
             parallel::for_each(&mut residual, |i, residual| *residual -= alpha * first_product[i]);
-            self.precondition(system, &residual, &mut second);
-            let mut product = std::mem::take(&mut self.product);
-            self.multiply(system, &mut second, &mut product);
-            let [overlap, square] = exact_sums(count, |i| Some([product[i] * residual[i], product[i] * product[i]]));
-            let omega = if square > 0.0 { overlap / square } else { 0.0 };
-            parallel::for_each(system.frame.images.real(x), |i, x| *x += alpha * first[i] + omega * second[i]);
-            parallel::for_each(&mut residual, |i, residual| *residual -= omega * product[i]);
-            let [projection] = exact_sums(count, |i| Some([residual[i] * self.shadow[i]]));
-            let beta = projection / state.projection * (alpha / omega);
-            state.projection = projection;
-            parallel::for_each(&mut self.direction, |i, direction| {
-                *direction = residual[i] + beta * (*direction - omega * first_product[i]);
-            });
-            self.product = product;
-            ends = !beta.is_finite();
+            if small > 0.0 && norm(&residual) <= small {
+                parallel::for_each(system.frame.images.real(x), |i, x| *x += alpha * first[i]);
+            } else {
+                self.precondition(system, &residual, &mut second);
+                let mut product = std::mem::take(&mut self.product);
+                self.multiply(system, &mut second, &mut product);
+                let [overlap, square] = exact_sums(count, |i| Some([product[i] * residual[i], product[i] * product[i]]));
+                let omega = if square > 0.0 { overlap / square } else { 0.0 };
+                parallel::for_each(system.frame.images.real(x), |i, x| *x += alpha * first[i] + omega * second[i]);
+                parallel::for_each(&mut residual, |i, residual| *residual -= omega * product[i]);
+                let [projection] = exact_sums(count, |i| Some([residual[i] * self.shadow[i]]));
+                let beta = projection / state.projection * (alpha / omega);
+                state.projection = projection;
+                parallel::for_each(&mut self.direction, |i, direction| {
+                    *direction = residual[i] + beta * (*direction - omega * first_product[i]);
+                });
+                self.product = product;
+                ends = !beta.is_finite();
+            }
         }
         (self.correction, self.second, self.second_product, self.residual) = (first, second, first_product, residual);
         !ends || state.steps == 1

@@ -1,4 +1,8 @@
-//! The viscous term of u^n, and what takes it to fourth order.
+//! The viscous term of u^n, and what takes it to fourth order in space and to second order in time.
+//!
+//! In the middle of the step, where the particles stand, u is u^n + ½Δt (ν ∇²u^n − ∇p/ρ + g). What ∇p and a uniform g add there to ν ∇²u is a
+//! gradient, which the pressure takes up; so ½νΔt ∇²∇²u^n is what makes the term one of the middle, and comes with the pass that
+//! takes the error of the compact Laplacian off, c ∇²∇²u^n of the opposite sign.
 
 use crate::base::{Matrix, Vector};
 use crate::discretisation::LaplacianAndGradient;
@@ -11,7 +15,7 @@ use crate::settings::Settings;
 pub struct Viscous<const D: usize> {
     dispersion: f64,
     laplacian: Vec<Vector<D>>,
-    /// Empty at second order.
+    /// What is added to it; empty at second order, at which the term is that of u^n.
     sharper: Vec<Vector<D>>,
 }
 
@@ -42,7 +46,8 @@ impl<const D: usize> Viscous<D> {
         );
         self.sharper.clear();
         if step.settings.viscous_order == 4 {
-            sharpen(step, flow, |i| self.laplacian[i], self.dispersion, &mut self.sharper);
+            let factor = self.dispersion - 0.5 * step.settings.kinematic_viscosity * step.time_step;
+            sharpen(step, flow, |i| self.laplacian[i], factor, &mut self.sharper);
         }
     }
 
