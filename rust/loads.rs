@@ -20,6 +20,8 @@ pub struct Load<const D: usize> {
     pub viscous_force: Vector<D>,
     pub pressure_torque: [f64; 3],
     pub viscous_torque: [f64; 3],
+    /// What the body's surface gives in unit time by viscous stress: its velocity times minus the viscous force.
+    pub viscous_power: f64,
 }
 
 impl<const D: usize> Default for Load<D> {
@@ -29,34 +31,42 @@ impl<const D: usize> Default for Load<D> {
             viscous_force: Vector::zeros(),
             pressure_torque: [0.0; 3],
             viscous_torque: [0.0; 3],
+            viscous_power: 0.0,
         }
     }
 }
 
-/// What the loads on a body are summed in: both forces, then both torques, of three components each.
-type Sums = [ExactSum; 12];
+/// What the loads on a body are summed in: both forces, then both torques, of three components each, and the power.
+type Sums = [ExactSum; 13];
 
 impl<const D: usize> Load<D> {
-    /// That of a pressure force that acts at `arm`, and a viscous force that acts at `surface`.
-    fn new(arm: &Vector<D>, pressure: Vector<D>, surface: &Vector<D>, viscous: Vector<D>) -> Self {
+    /// That of a pressure force that acts at `arm`, and a viscous force that acts at `surface`, which moves with `velocity`.
+    fn new(arm: &Vector<D>, pressure: Vector<D>, surface: &Vector<D>, viscous: Vector<D>, velocity: &Vector<D>) -> Self {
         Self {
             pressure_force: pressure,
             viscous_force: viscous,
             pressure_torque: cross(arm, &pressure),
             viscous_torque: cross(surface, &viscous),
+            viscous_power: -viscous.dot(velocity),
         }
     }
 
     fn add_to(&self, sums: &mut Sums) {
         let forces = [&self.pressure_force, &self.viscous_force].map(components);
-        let terms = forces.into_iter().chain([self.pressure_torque, self.viscous_torque]).flatten();
+        let terms = forces.into_iter().chain([self.pressure_torque, self.viscous_torque]).flatten().chain([self.viscous_power]);
         sums.iter_mut().zip(terms).for_each(|(sum, term)| sum.add(term));
     }
 
     fn of(sums: &Sums) -> Self {
         let three = |start: usize| std::array::from_fn(|k| sums[start + k].value());
         let force = |start: usize| Vector::from_fn(|k, _| sums[start + k].value());
-        Self { pressure_force: force(0), viscous_force: force(3), pressure_torque: three(6), viscous_torque: three(9) }
+        Self {
+            pressure_force: force(0),
+            viscous_force: force(3),
+            pressure_torque: three(6),
+            viscous_torque: three(9),
+            viscous_power: sums[12].value(),
+        }
     }
 }
 
@@ -75,7 +85,8 @@ pub fn loads<const D: usize>(
             let (pressure, viscous) = force_on(settings, particles, frame, walls, &pressure, s);
             let body = particles.body[s] as usize;
             let arm = particles.position[s] - centers[body];
-            Load::new(&arm, pressure, &(arm + particles.normal[s] * particles.depth[s]), viscous).add_to(&mut sums[body]);
+            let surface = arm + particles.normal[s] * particles.depth[s];
+            Load::new(&arm, pressure, &surface, viscous, &particles.velocity[s]).add_to(&mut sums[body]);
         }
     };
     // Most chunks hold no solid and give an empty vector.

@@ -14,7 +14,7 @@ use crate::interpolation::interpolate;
 use crate::loads::loads;
 use crate::neighbours::Grid;
 use crate::particles::{ParticleKind, Particles, is_late, lineage};
-use crate::report::{Clock, Report};
+use crate::report::{Clock, Report, dissipation};
 use crate::scheme::{self, Outcome, Scheme};
 use crate::settings::{Boundary, Settings};
 use crate::shifting::{Change, measures_divergence, shift};
@@ -162,7 +162,7 @@ impl<const D: usize> Simulation<D> {
             return Err(error);
         }
 
-        let iterations = scheme.solve(step, flow);
+        let solved = scheme.solve(step, flow);
         if let Some(symptom) = breakdown::find(step.settings, &flow.particles, &flow.frame, time_step) {
             let error = self.diverged(symptom, time_step, velocity_max);
             self.failed = Some(self.flow.restore());
@@ -171,14 +171,16 @@ impl<const D: usize> Simulation<D> {
         }
         let acting = |i: usize| scheme.acting_pressure(step, &flow.particles, i);
         let loads = loads(step.settings, &flow.particles, &flow.frame, &flow.walls, acting);
+        let dissipated = dissipation(step, flow, &loads, |i| scheme.viscous_laplacian(step, i));
         let mut report = Report::new(step, &flow.particles, &flow.frame.stencil.volume, scheme.penalty(time_step), loads);
+        report.dissipation = dissipated;
         flow.advance_positions(step); // (12)
         flow.walls.see_for_shift(step.settings, &flow.particles, &flow.frame);
         let Flow { particles, frame, walls, .. } = flow;
         shift(step.settings, particles, frame, walls, time_step, velocity_max, &mut self.change); // (18) (19)
         let measured = measures_divergence(step.settings);
         let divergence = |i: usize| if measured { self.change[i].divergence } else { scheme.divergence(i) };
-        report.outcome = Outcome::new(step.settings, particles, iterations, divergence);
+        report.outcome = Outcome::new(step.settings, particles, solved, divergence);
         self.end_step(time_step);
         report.clock = self.clock;
         report.counts = self.flow.particles.counts();

@@ -2,7 +2,7 @@
 
 use alsph::discretisation::LaplacianAndGradient;
 use alsph::flow::{Flow, Step};
-use alsph::scheme::Scheme;
+use alsph::scheme::{Scheme, Solved};
 use alsph::settings::{Eigenvalues, TimeStepLimits};
 use alsph::{Clock, ParticleKind, Particles, Settings, Simulation, Vector};
 use approx::assert_relative_eq;
@@ -29,7 +29,7 @@ impl Scheme<2> for Diffusion {
         settings.time_step_limits(velocity_max, self.largest)
     }
 
-    fn solve(&mut self, step: Step, Flow { particles, frame, walls, .. }: &mut Flow<2>) -> usize {
+    fn solve(&mut self, step: Step, Flow { particles, frame, walls, .. }: &mut Flow<2>) -> Solved {
         walls.see(step.settings, particles, frame);
         self.laplacian.resize(particles.real, Vector::zeros());
         self.divergence.resize(particles.real, 0.0);
@@ -45,7 +45,7 @@ impl Scheme<2> for Diffusion {
             particles.velocity[i] += self.laplacian[i] * factor;
         }
         frame.images.fill(&mut particles.velocity);
-        1
+        Solved::after(1)
     }
 
     fn divergence(&self, i: usize) -> f64 {
@@ -54,6 +54,10 @@ impl Scheme<2> for Diffusion {
 
     fn acting_pressure(&self, _: Step, particles: &Particles<2>, i: usize) -> f64 {
         particles.pressure[i]
+    }
+
+    fn viscous_laplacian(&self, _: Step, i: usize) -> Vector<2> {
+        self.laplacian[i]
     }
 
     fn penalty(&self, _: f64) -> f64 {

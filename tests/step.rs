@@ -282,7 +282,7 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
         // A second step in the same frame has nothing of the first.
         for _ in 0..2 {
             flow.remember();
-            let iterations = scheme.solve(step, &mut flow);
+            let solved = scheme.solve(step, &mut flow);
             let Flow { particles, frame, walls, before, body_force } = flow;
             let acting: Vec<_> = (0..particles.len()).map(|i| scheme.acting_pressure(step, &particles, i)).collect();
             let seen = acting.iter().zip(&particles.pressure).any(|(acting, p)| (acting - p).abs() > 1e-3);
@@ -293,7 +293,7 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
                 assert_relative_eq!(change, -gradient, epsilon = 1e-9);
             }
             let divergence = set.apply(Divergence(&set.particles.velocity)).into_iter().map(f64::abs);
-            let outcome = Outcome::new(&settings, &set.particles, iterations, |i| scheme.divergence(i));
+            let outcome = Outcome::new(&settings, &set.particles, solved, |i| scheme.divergence(i));
             assert_relative_eq!(outcome.divergence_max, divergence.clone().fold(0.0, f64::max), epsilon = 1e-12);
             assert_relative_eq!(outcome.divergence_sum, divergence.sum::<f64>(), max_relative = 1e-9);
             let Set { particles, frame } = set;

@@ -9,7 +9,7 @@ use crate::halo::Poison;
 use crate::particles::{ParticleKind, Particles};
 use crate::scheme::projection::{Projection, Sweeps};
 use crate::scheme::viscous::sharpen;
-use crate::scheme::{Outcome, Scheme};
+use crate::scheme::{Outcome, Scheme, Solved};
 use crate::settings::{DerivativeFrame, Eigenvalues, Settings, TimeStepLimits, VelocityLaplacian, WallPressure};
 use crate::shifting::measures_divergence;
 
@@ -74,7 +74,7 @@ impl<const D: usize> Scheme<D> for Alsph<D> {
         settings.time_step_limits(velocity_max, self.coefficients.largest)
     }
 
-    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> usize {
+    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> Solved {
         let largest = self.coefficients.largest.laplacian;
         self.coefficients.penalty = step.settings.penalty(step.velocity_max, step.time_step, largest);
         self.begin(flow);
@@ -96,15 +96,16 @@ impl<const D: usize> Scheme<D> for Alsph<D> {
             let last = iteration == step.settings.max_iterations;
             if last && measures_divergence(step.settings) {
                 flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
-                return iteration;
+                return Solved::after(iteration);
             }
             self.velocity_derivatives(step, flow);
             self.check_images(flow);
-            let outcome = Outcome::new(step.settings, &flow.particles, iteration, |i| self.divergence(i)); // (13)
+            let solved = Solved::after(iteration);
+            let outcome = Outcome::new(step.settings, &flow.particles, solved, |i| self.divergence(i)); // (13)
             // The first iteration has the old velocity only in its viscous term.
             let first_order = iteration == 1 && step.settings.viscous_theta < 1.0;
             if (outcome.converged && !first_order) || last || !outcome.divergence_max.is_finite() {
-                return iteration;
+                return solved;
             }
         }
         unreachable!("the loop ends at its cap")
@@ -121,9 +122,18 @@ impl<const D: usize> Scheme<D> for Alsph<D> {
         particles.pressure[i] + penalty + self.projection.unkept(particles, i)
     }
 
+    fn viscous_laplacian(&self, step: Step, i: usize) -> Vector<D> {
+        viscous_laplacian(&self.derived, &self.explicit, step, i)
+    }
+
     fn penalty(&self, _: f64) -> f64 {
         self.coefficients.penalty
     }
+}
+
+/// θ ∇²u^m of particle `i`, and what stands beside it.
+fn viscous_laplacian<const D: usize>(derived: &[Derived<D>], explicit: &[Vector<D>], step: Step, i: usize) -> Vector<D> {
+    derived[i].laplacian * step.settings.viscous_theta + explicit.get(i).copied().unwrap_or_else(Vector::zeros)
 }
 
 impl<const D: usize> Alsph<D> {
@@ -194,9 +204,8 @@ impl<const D: usize> Alsph<D> {
     fn predict_velocity(&mut self, step: Step, Flow { particles, frame, before, body_force, .. }: &Flow<D>) {
         let (dt, viscosity) = (step.time_step, step.settings.kinematic_viscosity);
         let condition = conditions(step.settings);
-        let (initial, derived, r_al) = (&before.velocity, &self.derived, self.coefficients.penalty);
-        let theta = step.settings.viscous_theta;
-        let explicit = |i: usize| self.explicit.get(i).copied().unwrap_or_else(Vector::zeros);
+        let (initial, r_al) = (&before.velocity, self.coefficients.penalty);
+        let (derived, explicit) = (&self.derived, &self.explicit);
         frame.stencil.for_each(
             GradientAndLaplacian(&self.divergence_pressure),
             frame.images.real(&mut self.velocity_star),
@@ -207,8 +216,7 @@ impl<const D: usize> Alsph<D> {
                     PressureRule::Zero | PressureRule::FromFluid => initial[i],
                     PressureRule::Solved | PressureRule::SolvedWithoutDivergence => {
                         initial[i]
-                            + (penalty * r_al + (derived[i].laplacian * theta + explicit(i)) * viscosity + body_force.at(i))
-                                * dt
+                            + (penalty * r_al + viscous_laplacian(derived, explicit, step, i) * viscosity + body_force.at(i)) * dt
                     }
                 };
             },

@@ -16,8 +16,8 @@ use crate::boundary::{PressureRule, VelocityRule, add_wall_flux, conditions, ext
 use crate::discretisation::{Divergence, Gradient};
 use crate::flow::{Flow, Step};
 use crate::particles::Particles;
-use crate::poisson::{Goal, Poisson, System};
-use crate::scheme::Scheme;
+use crate::poisson::{Goal, Poisson, Solution, System};
+use crate::scheme::{Scheme, Solved};
 use crate::scheme::projection::{Projection, Sweeps};
 use crate::scheme::viscous::Viscous;
 use crate::settings::{Eigenvalues, ProjectionSettings, Settings, Solver, TimeStepLimits};
@@ -100,6 +100,15 @@ impl<const D: usize> Isph<D> {
         }
     }
 
+    /// How a solve ended, of an explicit pressure how many steps it took.
+    fn solved(&self, Solution { iterations, residual }: Solution) -> Solved {
+        if self.relaxed.is_finite() {
+            return Solved::after(iterations);
+        }
+        let tolerance = self.goal.tolerance;
+        Solved { iterations, residual, within_tolerance: (tolerance > 0.0).then_some(residual <= tolerance) }
+    }
+
     /// The pressure that images and solids show.
     fn extend_pressure(&mut self, settings: &Settings, Flow { particles, frame, body_force, .. }: &mut Flow<D>) {
         extend_pressure(settings, frame, particles, body_force, &mut self.near_walls);
@@ -172,7 +181,7 @@ impl<const D: usize> Scheme<D> for Isph<D> {
         settings.time_step_limits(velocity_max, self.largest)
     }
 
-    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> usize {
+    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> Solved {
         self.projection.begin();
         let (frame, time_step) = (step.settings.derivative_frame, step.time_step);
         let solenoidal = |gradient: &Matrix<D>| frame.solenoidal_divergence(gradient, time_step);
@@ -199,7 +208,7 @@ impl<const D: usize> Scheme<D> for Isph<D> {
             });
         }
         flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
-        solution.iterations
+        self.solved(solution)
     }
 
     fn divergence(&self, i: usize) -> f64 {
@@ -208,6 +217,10 @@ impl<const D: usize> Scheme<D> for Isph<D> {
 
     fn acting_pressure(&self, _: Step, particles: &Particles<D>, i: usize) -> f64 {
         particles.pressure[i] + self.projection.unkept(particles, i)
+    }
+
+    fn viscous_laplacian(&self, _: Step, i: usize) -> Vector<D> {
+        self.viscous.laplacian(i)
     }
 
     fn penalty(&self, time_step: f64) -> f64 {

@@ -6,8 +6,7 @@ mod projection;
 mod viscous;
 mod weakly_compressible;
 
-use crate::base::exact_sums;
-use crate::base::parallel;
+use crate::base::{Vector, exact_sums, parallel};
 use crate::flow::{Flow, Step};
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::{DensityDiffusion, SchemeSettings, Settings, TimeStepLimits};
@@ -22,15 +21,18 @@ pub trait Scheme<const D: usize>: Send + Sync {
     fn limits(&self, settings: &Settings, velocity_max: f64) -> TimeStepLimits;
 
     /// Advance velocity and pressure to n+1, and leave `particles.position` in the frame of the last derivatives; that of the flow stands at
-    /// r^n, or in the middle of the step. Returns the number of iterations. What they leave of ∇·u is found with the shift where that
+    /// r^n, or in the middle of the step. What the iterations leave of ∇·u is found with the shift where that
     /// can ([`crate::shifting::measures_divergence`]), else by [`Scheme::divergence`].
-    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> usize;
+    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> Solved;
 
     /// ∇·u of the last derivatives, less [`Derived::solenoidal`].
     fn divergence(&self, i: usize) -> f64;
 
     /// What the velocity of the step had the gradient of.
     fn acting_pressure(&self, step: Step, particles: &Particles<D>, i: usize) -> f64;
+
+    /// ∇²u of particle `i` as the viscous term of the step had it.
+    fn viscous_laplacian(&self, step: Step, i: usize) -> Vector<D>;
 
     /// r_AL of a step so long: c² Δt, c being the speed of the waves by which the scheme keeps ∇·u small.
     fn penalty(&self, time_step: f64) -> f64;
@@ -52,11 +54,30 @@ pub fn build<const D: usize>(settings: &Settings) -> Box<dyn Scheme<D>> {
     }
 }
 
+/// How the iterations of a step ended.
+#[derive(Clone, Copy, Debug)]
+pub struct Solved {
+    pub iterations: usize,
+    /// What a Poisson solve left of its right-hand side, relative; NaN without one, or where it was not looked at.
+    pub residual: f64,
+    /// Whether that is within the solve's tolerance; None without one, where ∇·u tells (13).
+    pub within_tolerance: Option<bool>,
+}
+
+impl Solved {
+    /// After so many iterations, of which none solves a Poisson equation.
+    pub fn after(iterations: usize) -> Self {
+        Self { iterations, residual: f64::NAN, within_tolerance: None }
+    }
+}
+
 /// How a step ended.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Outcome {
     pub iterations: usize,
-    /// Whether ε of (13) was reached, else the cap ended the iteration.
+    /// Of the Poisson solve; NaN without one, or where it was not looked at.
+    pub residual: f64,
+    /// Whether the Poisson solve reached its tolerance, or without one whether ε of (13) was reached; else the cap ended the iteration.
     pub converged: bool,
     /// max |∇·u| over the fluid.
     pub divergence_max: f64,
@@ -65,11 +86,11 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// That of so many iterations which left this ∇·u, less [`Derived::solenoidal`].
+    /// That of iterations which left this ∇·u, less [`Derived::solenoidal`].
     pub fn new<const D: usize>(
         settings: &Settings,
         particles: &Particles<D>,
-        iterations: usize,
+        solved: Solved,
         divergence: impl Fn(usize) -> f64 + Sync,
     ) -> Self {
         let size = |i: usize| (particles.kind[i] == ParticleKind::Fluid).then(|| divergence(i).abs());
@@ -78,7 +99,8 @@ impl Outcome {
         let largest = |range: std::ops::Range<usize>| range.filter_map(size).fold(0.0, larger);
         let divergence_max = parallel::reduce(particles.real, largest, larger).unwrap_or_default();
         let [divergence_sum] = exact_sums(particles.real, |i| size(i).map(|size| [size]));
-        let converged = divergence_max <= settings.divergence_tolerance;
-        Self { iterations, converged, divergence_max, divergence_sum }
+        let Solved { iterations, residual, within_tolerance } = solved;
+        let converged = within_tolerance.unwrap_or(divergence_max <= settings.divergence_tolerance);
+        Self { iterations, residual, converged, divergence_max, divergence_sum }
     }
 }

@@ -10,13 +10,12 @@
 //! smooth (after Antuono et al. 2010); κ = α h c₀/8 that of entropically damped artificial compressibility (EDAC; Ramachandran and Puri
 //! 2019). A step is one of Störmer and Verlet in its frame: half of p, all of u, the other half of p. The viscous term is that of u^n.
 
-use crate::base::parallel;
-use crate::base::{Matrix, Vector};
+use crate::base::{Matrix, Vector, parallel};
 use crate::boundary::{PressureRule, VelocityRule, conditions, extend_pressure, extrapolate_vector};
 use crate::discretisation::{Divergence, GradientAndLaplacian};
 use crate::flow::{Flow, Step};
 use crate::particles::{ParticleKind, Particles};
-use crate::scheme::Scheme;
+use crate::scheme::{Scheme, Solved};
 use crate::scheme::viscous::Viscous;
 use crate::settings::{DensityDiffusion, Eigenvalues, Settings, TimeStepLimits};
 
@@ -122,7 +121,7 @@ impl<const D: usize> Scheme<D> for WeaklyCompressible<D> {
         settings.time_step_limits(velocity_max, self.largest)
     }
 
-    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> usize {
+    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> Solved {
         self.viscous.begin(step, flow, &mut self.divergence, Matrix::trace);
         self.advance_pressure(step, flow);
         self.extend_pressure(step.settings, flow);
@@ -133,7 +132,7 @@ impl<const D: usize> Scheme<D> for WeaklyCompressible<D> {
         self.diffuse_pressure(step, flow);
         self.extend_pressure(step.settings, flow);
         flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
-        1
+        Solved::after(1)
     }
 
     fn divergence(&self, i: usize) -> f64 {
@@ -142,6 +141,10 @@ impl<const D: usize> Scheme<D> for WeaklyCompressible<D> {
 
     fn acting_pressure(&self, _: Step, _: &Particles<D>, i: usize) -> f64 {
         self.pressure[i][0]
+    }
+
+    fn viscous_laplacian(&self, _: Step, i: usize) -> Vector<D> {
+        self.viscous.laplacian(i)
     }
 
     fn penalty(&self, time_step: f64) -> f64 {

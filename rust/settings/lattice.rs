@@ -53,10 +53,22 @@ impl Settings {
         slopes.iter().map(|(r, slope)| -factor * slope * r[0].powi(4) / 24.0).sum()
     }
 
+    /// V = 1 / Σ W of a particle on a square lattice, over Δx^D: nearly 1.
+    pub fn lattice_volume(&self) -> f64 {
+        1.0 / self.lattice_kernels().iter().map(|w| w.2).sum::<f64>()
+    }
+
     /// V_j |∇W|/r, negative, at the points of the unit lattice around the origin, and tr α.
     fn lattice_slopes(&self) -> (Vec<([f64; 3], f64)>, f64) {
+        let (weights, volume) = (self.lattice_kernels(), self.lattice_volume());
+        let trace = weights.iter().map(|w| -volume * w.3 * w.1 * w.1).sum();
+        (weights.into_iter().map(|(r, _, _, slope)| (r, volume * slope)).collect(), trace)
+    }
+
+    /// The points of the unit lattice around the origin, each with its distance, W and |∇W|/r, negative.
+    fn lattice_kernels(&self) -> Vec<([f64; 3], f64, f64, f64)> {
         let (ratio, dimensions) = (self.smoothing_ratio, self.dimensions);
-        let weights = with_kernel!(self.kernel, kernel => {
+        with_kernel!(self.kernel, kernel => {
             let smoothing = Smoothing::new(kernel, ratio, dimensions);
             lattice(dimensions, self.kernel.support() * ratio)
                 .map(|r| {
@@ -64,11 +76,8 @@ impl Settings {
                     let slope = if distance > 0.0 { smoothing.slope(distance) } else { 0.0 };
                     (r, distance, smoothing.value(distance), slope)
                 })
-                .collect::<Vec<_>>()
-        });
-        let volume = 1.0 / weights.iter().map(|w| w.2).sum::<f64>();
-        let trace = weights.iter().map(|w| -volume * w.3 * w.1 * w.1).sum();
-        (weights.into_iter().map(|(r, _, _, slope)| (r, volume * slope)).collect(), trace)
+                .collect()
+        })
     }
 
     /// The largest value of `eigenvalue`, which gets the phase of a wave at a lattice point, over the wave vectors.

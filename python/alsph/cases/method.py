@@ -290,7 +290,7 @@ class Method(Parameters):
                 "kind": "isph",
                 "pressure_share": 0.9 if self.pressure_share is None else self.pressure_share,
                 "solver": self.solver or "bicgstab",
-                "tolerance": 1e-3 if self.solver_tolerance is None else self.solver_tolerance,
+                "tolerance": self.residual_tolerance,
                 "max_solver_iterations": self.most_iterations,
             }
         if self.scheme == "explicit_isph":
@@ -306,6 +306,13 @@ class Method(Parameters):
         if self.scheme == "wcsph":
             settings["density_diffusion"] = self.density_diffusion or "antuono"
         return settings
+
+    @property
+    def residual_tolerance(self) -> float:
+        """Relative residual that the Poisson solve of a step is to reach; 0 where there is none to reach."""
+        if self.scheme != "isph":
+            return 0.0
+        return 1e-3 if self.solver_tolerance is None else self.solver_tolerance
 
     @property
     def most_iterations(self) -> int:

@@ -54,6 +54,8 @@ OWN = re.compile(
 """Names of the files that alsph makes in a run folder and its figures, and removes when the folder is replaced."""
 UNFINISHED = ("starting", "running", "interrupted")
 """What ``run.json`` says of a run that goes on or can go on."""
+UNKNOWN = "nan"
+"""What stands in the history for what an older alsph did not record."""
 SPARE_BYTES = 2 * 2**20
 """Room that must stay free on the disk beside what is written next."""
 PATIENCE_SECONDS = 2.0
@@ -215,14 +217,24 @@ class RunFolder:
             file.write(f"{clock.strftime('%Y-%m-%d %H:%M:%S')}  {printable(line)}\n")
 
     def append_history(self, rows: dict[str, NDArray[Any]], bodies: list[str]) -> None:
-        """Append rows of :meth:`alsph.Simulation.new_history` to ``history.csv``."""
+        """Append rows of :meth:`alsph.Simulation.new_history` to ``history.csv``.
+
+        That of an older alsph is given the columns that it lacks first.
+        """
         columns = flatten(rows, bodies)
-        self._make_room(2 * size_of(columns))
-        with self._writing(), self._file("history.csv").open("a", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            if file.tell() == 0:
-                writer.writerow(columns)
-            writer.writerows(history_lines(rows, bodies))
+        path = self._file("history.csv")
+        with self._writing():
+            known = _columns_of(path)
+        missing = [name for name in columns if name not in known]
+        self._make_room(2 * size_of(columns) + (2 * path.stat().st_size if known and missing else 0))
+        with self._writing():
+            if known and missing:
+                _widen(path, missing)
+            with path.open("a", newline="", encoding="utf-8") as file:
+                writer = csv.DictWriter(file, [*known, *missing], restval=UNKNOWN, lineterminator="\n")
+                if file.tell() == 0:
+                    writer.writeheader()
+                writer.writerows(dict(zip(columns, line, strict=True)) for line in history_lines(rows, bodies))
 
     def append_particles(self, time: float, particles: dict[str, NDArray[Any]]) -> None:
         """Append an output to ``particles.vtkhdf``."""
@@ -410,6 +422,22 @@ def _truncate_history(path: Path, last: int) -> None:
                 number = row.split(b",")[0] if row.count(b",") == header.count(b",") and row.endswith(b"\n") else b""
                 if number.isdigit() and int(number) <= last:
                     new.write(row)
+
+
+def _columns_of(path: Path) -> list[str]:
+    """Return the names of the columns of a history, none if there is none, or it is damaged."""
+    if not path.exists():
+        return []
+    with path.open(encoding="utf-8", errors="replace") as file:
+        header = file.readline()
+    return header.rstrip("\n").split(",") if header.startswith("step,") and header.endswith("\n") else []
+
+
+def _widen(path: Path, columns: list[str]) -> None:
+    """Give a history further columns, unknown in all its rows."""
+    with path.open("rb") as file, replacing(path) as new_path, new_path.open("wb") as new:
+        new.write(b",".join([next(file).rstrip(b"\n"), *(name.encode() for name in columns)]) + b"\n")
+        new.writelines(row.rstrip(b"\n") + f",{UNKNOWN}".encode() * len(columns) + b"\n" for row in file)
 
 
 def flatten(rows: dict[str, NDArray[Any]], bodies: list[str]) -> dict[str, NDArray[Any]]:

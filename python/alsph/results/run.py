@@ -27,7 +27,7 @@ from alsph.results.dimensional import dimensional
 from alsph.results.export import Grid
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.loads import Loads
-from alsph.results.outcome import outcome
+from alsph.results.outcome import outcome, unsolved
 from alsph.text import duration, in_figure, printable, shown
 from alsph.units import Units
 
@@ -123,7 +123,8 @@ class Run(Loads):
 
         What resolution, method and domain cannot carry (:meth:`alsph.cases.Case.remarks`), and what came of the run.
         """
-        return [*outcome(self, self.config.until), *self._judged[1], *self.config.case.remarks()]
+        case = self.config.case
+        return [*outcome(self, self.config.until), *unsolved(self, case), *self._judged[1], *case.remarks()]
 
     @property
     def units(self) -> Units | None:

@@ -11,7 +11,7 @@ from alsph.engine.prescribed import WORDS, difference
 from alsph.engine.simulation import SLICE_SECONDS, Simulation
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.folder import checkpoint
-from alsph.folder.run_folder import START, RunFolder, history_lines
+from alsph.folder.run_folder import START, UNKNOWN, RunFolder, flatten, history_lines
 from alsph.running import beginning
 from alsph.running.progress import Reporter
 from alsph.running.provenance import provenance
@@ -102,8 +102,10 @@ def repeat(path: str | Path, threads: int | None = None, *, progress: bool = Tru
                 simulation.advance(end - simulation.step, SLICE_SECONDS)
                 rows = simulation.new_history(keep=False)
                 reporter.update(rows)
+                columns = list(flatten(rows, bodies))
                 for line in history_lines(rows, bodies):
-                    unequal = unequal or _difference(names, next(file, ""), line)
+                    now = dict(zip(columns, line, strict=True))
+                    unequal = unequal or _difference(names, next(file, ""), now)
     return Repetition(
         steps=simulation.step,
         same_state=checkpoint.digest(simulation.state()) == info["checkpoint"]["state_sha256"],
@@ -150,17 +152,21 @@ def _case(tables: Any, settings: config.RunSettings, folder: RunFolder) -> Confi
         raise RunFolderError(f"{folder.path}/run.json: the case of a segment cannot be used: {error}") from None
 
 
-def _difference(names: list[str], then: str, now: list[str]) -> str:
-    """Say where a row of the history differs from the line that was recorded, or return nothing."""
-    was = then.rstrip("\n").split(",")
-    if was == now:
-        return ""
-    if len(was) != len(now):
-        return f"step {now[0]}: not in the recorded history"
-    index = next(k for k in range(len(now)) if was[k] != now[k])
-    name = names[index] if index < len(names) else f"column {index + 1}"
-    try:
-        change = f" (by {abs(float(now[index]) - float(was[index])):.3g})"
-    except ValueError:  # a damaged line
-        change = ""
-    return f"step {now[0]}: {name} is {now[index]}, was {was[index]}{change}"
+def _difference(names: list[str], then: str, now: dict[str, str]) -> str:
+    """Say where a row of the history differs from the line that was recorded, or return nothing.
+
+    What an older alsph did not record is not compared.
+    """
+    recorded = then.rstrip("\n").split(",")
+    if len(recorded) != len(names) or "step" not in names:
+        return f"step {now['step']}: not in the recorded history"
+    was = dict(zip(names, recorded, strict=True))
+    for name, value in now.items():
+        if was.get(name, UNKNOWN) in (value, UNKNOWN):
+            continue
+        try:
+            change = f" (by {abs(float(value) - float(was[name])):.3g})"
+        except ValueError:  # a damaged line
+            change = ""
+        return f"step {now['step']}: {name} is {value}, was {was[name]}{change}"
+    return ""
