@@ -20,8 +20,9 @@ pub struct Load<const D: usize> {
     pub viscous_force: Vector<D>,
     pub pressure_torque: [f64; 3],
     pub viscous_torque: [f64; 3],
-    /// What the body's surface gives in unit time by viscous stress: its velocity times minus the viscous force.
-    pub viscous_power: f64,
+    /// What the surface gives in unit time as it slides along itself: minus both forces, of which only the sum is the fluid's loss, times
+    /// its velocity without the normal part.
+    pub sliding_power: f64,
 }
 
 impl<const D: usize> Default for Load<D> {
@@ -31,7 +32,7 @@ impl<const D: usize> Default for Load<D> {
             viscous_force: Vector::zeros(),
             pressure_torque: [0.0; 3],
             viscous_torque: [0.0; 3],
-            viscous_power: 0.0,
+            sliding_power: 0.0,
         }
     }
 }
@@ -40,20 +41,21 @@ impl<const D: usize> Default for Load<D> {
 type Sums = [ExactSum; 13];
 
 impl<const D: usize> Load<D> {
-    /// That of a pressure force that acts at `arm`, and a viscous force that acts at `surface`, which moves with `velocity`.
-    fn new(arm: &Vector<D>, pressure: Vector<D>, surface: &Vector<D>, viscous: Vector<D>, velocity: &Vector<D>) -> Self {
+    /// That of a pressure force that acts at `arm`, and a viscous force that acts at `surface`, whose velocity along itself is `sliding`.
+    fn new(arm: &Vector<D>, pressure: Vector<D>, surface: &Vector<D>, viscous: Vector<D>, sliding: &Vector<D>) -> Self {
         Self {
             pressure_force: pressure,
             viscous_force: viscous,
             pressure_torque: cross(arm, &pressure),
             viscous_torque: cross(surface, &viscous),
-            viscous_power: -viscous.dot(velocity),
+            sliding_power: -(pressure + viscous).dot(sliding),
         }
     }
 
     fn add_to(&self, sums: &mut Sums) {
         let forces = [&self.pressure_force, &self.viscous_force].map(components);
-        let terms = forces.into_iter().chain([self.pressure_torque, self.viscous_torque]).flatten().chain([self.viscous_power]);
+        let terms =
+            forces.into_iter().chain([self.pressure_torque, self.viscous_torque]).flatten().chain([self.sliding_power]);
         sums.iter_mut().zip(terms).for_each(|(sum, term)| sum.add(term));
     }
 
@@ -65,7 +67,7 @@ impl<const D: usize> Load<D> {
             viscous_force: force(3),
             pressure_torque: three(6),
             viscous_torque: three(9),
-            viscous_power: sums[12].value(),
+            sliding_power: sums[12].value(),
         }
     }
 }
@@ -85,8 +87,9 @@ pub fn loads<const D: usize>(
             let (pressure, viscous) = force_on(settings, particles, frame, walls, &pressure, s);
             let body = particles.body[s] as usize;
             let arm = particles.position[s] - centers[body];
-            let surface = arm + particles.normal[s] * particles.depth[s];
-            Load::new(&arm, pressure, &surface, viscous, &particles.velocity[s]).add_to(&mut sums[body]);
+            let (normal, velocity) = (&particles.normal[s], &particles.velocity[s]);
+            let (surface, sliding) = (arm + normal * particles.depth[s], velocity - normal * velocity.dot(normal));
+            Load::new(&arm, pressure, &surface, viscous, &sliding).add_to(&mut sums[body]);
         }
     };
     // Most chunks hold no solid and give an empty vector.

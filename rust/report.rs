@@ -110,7 +110,13 @@ impl<const D: usize> Report<D> {
         Self {
             clock: Clock::default(),
             time_step: step.time_step,
-            outcome: Outcome { iterations: 0, residual: f64::NAN, converged: false, divergence_max: 0.0, divergence_sum: 0.0 },
+            outcome: Outcome {
+                iterations: 0,
+                residual: f64::NAN,
+                converged: false,
+                divergence_max: 0.0,
+                divergence_sum: 0.0,
+            },
             velocity_max: step.velocity_max,
             penalty,
             fluid: particles.counts()[ParticleKind::Fluid as usize],
@@ -139,9 +145,9 @@ impl Packing {
 }
 
 /// What viscosity takes of the fluid's kinetic energy in unit time. Where nothing flows in or out it is 2ρν ∫ S:S dV, S = (∇u + ∇uᵀ)/2: the work
-/// −ρν ∫ u·∇²u dV that the viscous term `laplacian` does in the step against the mean of u^n and u^{n+1}, so that it is the energy that goes
-/// to the last bit of it, and what moving walls give, which it passes on. (ρν ∫ ∇u:∇u dV differs from it where walls turn.) The gradient that
-/// the particles see would give too little: 3 % of a wave over 50 particles.
+/// −ρν ∫ u·∇²u dV that the viscous term `laplacian` takes in the step of the mean of u^n and u^{n+1}, and what
+/// walls give that slide along themselves. (ρν ∫ ∇u:∇u dV is another where walls turn.) Formed of the gradients that the particles
+/// see it would be too small, by 3 % for a wave over 50 particles, and the budget of energy would not tell what the scheme loses.
 pub fn dissipation<const D: usize>(
     step: Step,
     Flow { particles, before, frame, .. }: &Flow<D>,
@@ -152,7 +158,7 @@ pub fn dissipation<const D: usize>(
         let mean = || (before.velocity[i] + particles.velocity[i]) * 0.5;
         (particles.kind[i] == ParticleKind::Fluid).then(|| [-frame.stencil.volume[i] * mean().dot(&laplacian(i))])
     });
-    let given: f64 = loads.iter().map(|load| load.viscous_power).sum();
+    let given: f64 = loads.iter().map(|load| load.sliding_power).sum();
     step.settings.density * step.settings.kinematic_viscosity * taken + given
 }
 

@@ -216,7 +216,8 @@ impl<const D: usize> Alsph<D> {
                     PressureRule::Zero | PressureRule::FromFluid => initial[i],
                     PressureRule::Solved | PressureRule::SolvedWithoutDivergence => {
                         initial[i]
-                            + (penalty * r_al + viscous_laplacian(derived, explicit, step, i) * viscosity + body_force.at(i)) * dt
+                            + (penalty * r_al + viscous_laplacian(derived, explicit, step, i) * viscosity + body_force.at(i))
+                                * dt
                     }
                 };
             },

@@ -17,9 +17,9 @@ use crate::discretisation::{Divergence, Gradient};
 use crate::flow::{Flow, Step};
 use crate::particles::Particles;
 use crate::poisson::{Goal, Poisson, Solution, System};
-use crate::scheme::{Scheme, Solved};
 use crate::scheme::projection::{Projection, Sweeps};
 use crate::scheme::viscous::Viscous;
+use crate::scheme::{Scheme, Solved};
 use crate::settings::{Eigenvalues, ProjectionSettings, Settings, Solver, TimeStepLimits};
 use crate::shifting::measures_divergence;
 

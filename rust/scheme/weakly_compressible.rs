@@ -15,8 +15,8 @@ use crate::boundary::{PressureRule, VelocityRule, conditions, extend_pressure, e
 use crate::discretisation::{Divergence, GradientAndLaplacian};
 use crate::flow::{Flow, Step};
 use crate::particles::{ParticleKind, Particles};
-use crate::scheme::{Scheme, Solved};
 use crate::scheme::viscous::Viscous;
+use crate::scheme::{Scheme, Solved};
 use crate::settings::{DensityDiffusion, Eigenvalues, Settings, TimeStepLimits};
 
 /// The fields of one step beside those of the particles, real particles and, where they have neighbours that read them, images.

@@ -37,7 +37,7 @@ def outcome(run: Record, until: float) -> list[str]:
 
 
 def unsolved(run: Record, case: Case) -> list[str]:
-    """Remark on steps whose Poisson solve ended above its tolerance; those of which no residual is known do not count."""
+    """Remark on steps whose Poisson solve ended above its tolerance, of those whose residual is known."""
     residual = run.history.get("residual", np.empty(0))
     looked = np.isfinite(residual)
     if not looked.any() or not case.residual_tolerance:
