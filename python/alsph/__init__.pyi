@@ -25,6 +25,7 @@ from .running.start import resume
 from .study.autotune import autotune
 from .study.comparison import Comparison, compare
 from .study.convergence import converge
+from .study.schemes import SchemeComparison, compare_schemes
 from .study.validation import validate
 from .units import Units
 from .watching.server import watch
@@ -35,6 +36,7 @@ __all__ = [
     "Comparison",
     "Domain",
     "Run",
+    "SchemeComparison",
     "Simulation",
     "SolidBody",
     "Units",
@@ -42,6 +44,7 @@ __all__ = [
     "autotune",
     "cases",
     "compare",
+    "compare_schemes",
     "converge",
     "errors",
     "open_run",

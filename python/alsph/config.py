@@ -193,6 +193,15 @@ class Config:
         path.write_bytes(self.text().encode())
 
 
+def overridden(tables: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Return the tables of a configuration with other parameters and settings, without those that they supersede."""
+    gone = cases.method.superseded(changes, tables)
+    kept = {name: value for name, value in tables.items() if name not in gone}
+    settings = {name: value for name, value in changes.items() if name in RunSettings.model_fields}
+    parameters = {name: value for name, value in changes.items() if name not in settings}
+    return kept | parameters | {"run": tables.get("run", {}) | settings}
+
+
 def of_the_flow(tables: dict[str, Any]) -> dict[str, Any]:
     """Return the tables of a case without its units, of which no more than the Reynolds number counts."""
     return {name: value for name, value in tables.items() if name != "units"}

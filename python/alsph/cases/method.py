@@ -79,8 +79,26 @@ OWN = {
 }
 """The schemes that a parameter belongs to, of those that do not belong to all."""
 
+OWNERS = OWN | {"algorithm": ("alsph",)}
+"""The same with what others have, too, but for one value."""
+
 DIFFUSION = {"wcsph": 0.1, "edac": 0.5}
 """Coefficient of each weakly compressible scheme's diffusion where none is given: δ of δ-SPH, α of EDAC."""
+
+
+def of_all_schemes(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those of a case's parameters that hold whatever its scheme: not its own, nor what follows from it."""
+    follows = _goes_with(values.get("scheme")) | {"courant": COURANT}
+    if values.get("penalty_constant") is not None:
+        follows["time_step"] = PAPER["time_step"]
+    left_out = {"scheme", *OWNERS, *(name for name, value in follows.items() if values.get(name) == value)}
+    return {name: value for name, value in values.items() if name not in left_out}
+
+
+def of_scheme(scheme: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those of a case's parameters that belong to a scheme and are not what it has by default."""
+    own = {name: value for name, value in values.items() if scheme in OWNERS.get(name, ())}
+    return {name: value for name, value in own.items() if value not in (None, Method.model_fields[name].default)}
 
 
 class Method(Parameters):

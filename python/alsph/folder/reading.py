@@ -73,6 +73,7 @@ def info(path: Path) -> dict[str, Any]:
     kinds: dict[str, Any] = {
         "time": (int, float),
         "seconds": (int, float),
+        "cpu_seconds": (int, float),
         "step": int,
         "segments": list,
         "retries": list,

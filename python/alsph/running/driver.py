@@ -32,6 +32,8 @@ class Driver:
     def __init__(self, config: Config, folder: RunFolder, simulation: Simulation, info: dict[str, Any]) -> None:
         self.folder = folder
         self.started = clock.monotonic() - float(info.get("seconds", 0))
+        spent = info.get("cpu_seconds", math.nan if "seconds" in info else 0.0)  # an older alsph did not tell
+        self.cpu_started = clock.process_time() - float(spent)
         self.provenance = provenance(simulation.threads)
         self.segments: list[dict[str, Any]] = info.get("segments", [])
         self.retries: list[dict[str, Any]] = info.get("retries", [])
@@ -219,6 +221,8 @@ class Driver:
             "segments": self.segments,
             "retries": self.retries,
         }
+        if math.isfinite(self.cpu_started):
+            facts["cpu_seconds"] = round(clock.process_time() - self.cpu_started, 3)
         if self.start is not None:
             facts["start"] = self.start
         self.folder.write_info(facts | self.provenance)

@@ -34,6 +34,9 @@ LONGEST_CELL = 40
 OF_PARAMETERS = ("case", "Reynolds number", "resolution, D/Δx")
 """Results of a summary that stand among the parameters."""
 
+CPU, STEPS = "CPU seconds a D/U", "steps a D/U"
+"""Costs: those of all threads, and of how many steps."""
+
 Table = dict[str, list[Any]]
 
 
@@ -74,7 +77,7 @@ class Comparison:
     @cached_property
     def costs(self) -> Table:
         """What each run took, by name."""
-        costs = [_costs(run) for run in self.runs.values()]
+        costs = [costs_of(run) for run in self.runs.values()]
         return {name: [cost[name] for cost in costs] for name in costs[0]}
 
     @cached_property
@@ -226,17 +229,19 @@ def _sum(sha256: str) -> str:
     return f", SHA-256 {sha256[:8]}"
 
 
-def _costs(run: Run) -> dict[str, Any]:
+def costs_of(run: Run) -> dict[str, Any]:
     """Return what a run took, by name; NaN where its folder does not tell."""
     seconds, threads, time = run.info.get("seconds", np.nan), run.info.get("threads", np.nan), run.history["time"]
     counts, versions = run.info.get("particles"), run.info.get("versions")
     rate = seconds / time[-1] if len(time) else np.nan
+    cpu = run.info.get("cpu_seconds", np.nan)
     return {
         "particles": sum(counts.values()) if isinstance(counts, dict) else None,
-        "steps a D/U": len(time) / time[-1] if len(time) else np.nan,
+        STEPS: len(time) / time[-1] if len(time) else np.nan,
         "wall seconds a D/U": rate,
         "threads": threads,
         "wall seconds a D/U times threads": rate * threads,
+        CPU: cpu / time[-1] if len(time) else np.nan,
         "processor": run.info.get("machine", {}).get("processor"),
         "alsph, commit": f"{versions.get('alsph') if isinstance(versions, dict) else ''}, {run.info.get('commit')}",
     }
