@@ -17,7 +17,8 @@ def found(command, context):
     """Yield the words of every command and group, and what it is."""
     yield context.command_path.split()[1:], command, context
     if isinstance(command, CaseGroup):
-        others = CASES if context.info_name == "run" else ["cylinder"]  # the options of a case are the same in all
+        cases = CASES if context.info_name == "run" else ["cylinder"]  # the options of a case are the same in all
+        others = [*cases, *command.beside]
     else:
         others = getattr(command, "commands", ())
     for name in others:

@@ -47,6 +47,8 @@ def _described(name: str, command: Any, above: Any, level: int) -> Iterator[str]
         case = command.get_command(context, Cylinder.name)  # one stands for all
         yield from _options(case, Context(case, info_name="CASE", parent=context), *OF_THE_CASE)
         yield f"\n{OF_A_CASE}\n"
+        for other in command.beside:
+            yield from _described(other, command.beside[other], context, level + 1)
     else:
         yield from _options(command, context)
     if above is None or not isinstance(command, CaseGroup):

@@ -26,7 +26,7 @@ COMMANDS = {
     "watch": ("runs", "Show a run, going on or ended, on a page in a browser."),
     "plot": ("runs", "Draw the figures of a run."),
     "export": ("runs", "Write a snapshot of a run on a regular grid, for other programs."),
-    "compare": ("studies", "Compare runs: what differs in them, what they found, and how far apart they are."),
+    "compare": ("comparison", "Compare runs, or the schemes of a case: what they found, and what it took."),
     "animate": ("runs", "Make a film of a field from the snapshots of a run."),
     "validate": ("studies", "Run cases at several resolutions and compare them with their references."),
     "study": ("studies", "Run a parameter study, draw its figures and write its tables."),

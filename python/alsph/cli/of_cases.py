@@ -13,15 +13,14 @@ from alsph import cases
 from alsph.cli.app import COMMANDS
 from alsph.cli.common import Jobs, Retry, Scheduler, StudyOutput, Walltime
 from alsph.cli.help import App
-from alsph.cli.options import group_of_cases
+from alsph.cli.options import Given, group_of_cases
 from alsph.cli.terminal import say, say_run, say_table
-from alsph.config import Config
 from alsph.errors import ConfigError
 from alsph.running.control import Control, seconds_of
 
 
 def _run(
-    configuration: Config,
+    given: Given,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="run folder", show_default="runs/CASE")] = None,
     force: Annotated[bool, typer.Option("--force", help="replace an existing run folder")] = False,
     walltime: Walltime = None,
@@ -30,20 +29,20 @@ def _run(
     from alsph.running.start import start
 
     control = Control(walltime=seconds_of(walltime), retry=retry)
-    say_run(start(configuration, output or Path("runs") / configuration.case.name, control, force=force))
+    say_run(start(given.config, output or Path("runs") / given.config.case.name, control, force=force))
 
 
 def _describe(
-    configuration: Config,
+    given: Given,
     probe: Annotated[bool, typer.Option(help="take a few steps to estimate the time")] = True,
 ) -> None:
     from alsph.running.describe import describe
 
-    say_table(describe(configuration, probe=probe))
+    say_table(describe(given.config, probe=probe))
 
 
 def _autotune(
-    configuration: Config,
+    given: Given,
     divergence: Annotated[float, typer.Option(help="mean |∇·u| that is good enough [U/D]")] = 1e-3,
     develop: Annotated[float, typer.Option(help="time for which the flow is developed first [D/U]")] = 3.0,
     probe: Annotated[float, typer.Option(help="length of each probe [D/U]")] = 1.0,
@@ -53,16 +52,16 @@ def _autotune(
         typer.Option("--output", "-o", help="folder for report and case", show_default="runs/autotune/CASE"),
     ] = None,
 ) -> None:
-    folder = output or Path("runs/autotune") / configuration.case.name
+    folder = output or Path("runs/autotune") / given.config.case.name
     tuning = alsph.autotune(
-        configuration.case, divergence, develop=develop, probe=probe, margin=margin, threads=configuration.run.threads
+        given.config.case, divergence, develop=develop, probe=probe, margin=margin, threads=given.config.run.threads
     )
     tuning.save(folder)
     say(f"\n{tuning}\n\nalsph run {folder / 'case.toml'}")
 
 
 def _converge(
-    configuration: Config,
+    given: Given,
     resolutions: Annotated[str, typer.Option(help="three or more resolutions D/Δx, as 10,14,20")] = "10,14,20",
     jobs: Jobs = None,
     output: StudyOutput = Path("runs/studies"),
@@ -72,8 +71,8 @@ def _converge(
         ladder = [int(text) for text in resolutions.split(",")]
     except ValueError:
         raise ConfigError(f"resolutions = {resolutions!r}: must be whole numbers with commas, as 10,14,20") from None
-    threads = configuration.run.threads or 1
-    report = alsph.converge(configuration, ladder, output, jobs=jobs, threads=threads, scheduler=scheduler)
+    threads = given.config.run.threads or 1
+    report = alsph.converge(given.config, ladder, output, jobs=jobs, threads=threads, scheduler=scheduler)
     say(f"\n{report}\n{report.path / 'convergence.md'}")
     raise typer.Exit(not report.results.complete)
 

@@ -4,7 +4,9 @@ import functools
 import inspect
 import re
 import types
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import typer
@@ -15,7 +17,7 @@ from alsph.cases.method import Method
 from alsph.cli.common import one_of
 from alsph.cli.help import App, Group
 from alsph.cli.terminal import exit_codes
-from alsph.config import RunSettings
+from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters, describe_default
 from alsph.text import shown
@@ -32,12 +34,29 @@ UNITS = {f"units_{name}" for name in Units.model_fields}
 """The entries of the table `units` as options."""
 
 
+@dataclass(frozen=True)
+class Given:
+    """What a command is given: the tables of a case or its file, and the values of the options."""
+
+    tables: dict[str, Any]
+    values: dict[str, Any]
+
+    @cached_property
+    def config(self) -> Config:
+        """The configuration that they make."""
+        return config.from_tables(config.overridden(self.tables, self.values))
+
+
 def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Callable[..., None]:
-    """Return a command for a case: `action` called with the configuration that the options make."""
+    """Return a command for a case: `action` called with what is given.
+
+    An option of the action's own takes the place of a parameter of all cases of the same name.
+    """
     own = list(inspect.signature(action).parameters.values())[1:]
-    taken = {parameter.name for parameter in own} | RunSettings.model_fields.keys() | UNITS | {"context", "case", "run"}
-    names = [name for name in model.parameter_names() if name != "units"]
-    if clashes := sorted(taken & model.model_fields.keys()):
+    owned = {parameter.name for parameter in own}
+    taken = (owned - cases.Case.model_fields.keys()) | RunSettings.model_fields.keys() | UNITS
+    names = [name for name in model.parameter_names() if name not in {"units", *owned}]
+    if clashes := sorted((taken | {"context", "case", "run"}) & model.model_fields.keys()):
         raise ConfigError(
             f"{model.__name__}: its parameter '{clashes[0]}' has the name of an option; give it another one"
         )
@@ -54,11 +73,7 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
         given = {name: value for name, value in (values | joined).items() if value is not None}
         if units := {name.removeprefix("units_"): given.pop(name) for name in UNITS & given.keys()}:
             given["units"] = tables.get("units", {}) | units
-        for name in cases.method.superseded(given, tables):
-            tables.pop(name, None)
-        for name, value in given.items():
-            (tables["run"] if name in RunSettings.model_fields else tables)[name] = value
-        action(config.from_tables(tables), **extra)
+        action(Given(tables, given), **extra)
 
     first = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
     keywords = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own]
@@ -83,6 +98,8 @@ class CaseGroup(Group):
     """
 
     action: Callable[..., None]
+    beside: Mapping[str, Any] = {}
+    """Commands that are of no case, by name."""
     listed = "Cases"
 
     def list_commands(self, ctx: Any) -> list[str]:
@@ -95,6 +112,8 @@ class CaseGroup(Group):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of a case, or of the case in a file."""
+        if cmd_name in self.beside:
+            return self.beside[cmd_name]
         with exit_codes():
             if cmd_name.endswith(".toml"):
                 ctx.obj = config.load(cmd_name)
@@ -106,9 +125,9 @@ class CaseGroup(Group):
         raise AssertionError("the block ends in one way or the other")
 
 
-def group_of_cases(action: Callable[..., None]) -> type[CaseGroup]:
-    """Return a group of commands, one a case: `action` called with the configuration that the options make."""
-    return type("Cases", (CaseGroup,), {"action": staticmethod(action)})
+def group_of_cases(action: Callable[..., None], base: type[CaseGroup] = CaseGroup) -> type[CaseGroup]:
+    """Return a group of commands, one a case: `action` called with what is given (:class:`Given`)."""
+    return type("Cases", (base,), {"action": staticmethod(action)})
 
 
 def _options(

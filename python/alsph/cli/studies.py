@@ -1,4 +1,4 @@
-"""The commands of several runs: compare, study and validate.
+"""The commands of several runs: study and validate.
 
 What does the work is imported where it is called, so that help comes at once.
 """
@@ -14,9 +14,6 @@ from alsph.cli.help import App, Group
 from alsph.cli.terminal import complain, exit_codes, say, say_table
 from alsph.running.control import seconds_of
 from alsph.text import printable
-
-LONGEST_NAME = 100
-"""Letters of the folder of a comparison."""
 
 
 class StudyGroup(Group):
@@ -93,26 +90,6 @@ def _study_draw(name: StudyName, preset: Preset = None, output: StudyOutput = Pa
 def _study_list() -> None:
     """List the studies that come with alsph."""
     say_table([(name, alsph.study.load(name).title) for name in alsph.study.shipped()])
-
-
-@app.command("compare")
-@exit_codes()
-def _compare(
-    paths: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="run folders; the first is the measure")],
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", help="folder for table and figures", show_default="runs/comparison/RUN_RUN..."),
-    ] = None,
-) -> None:
-    """Compare runs: what differs in them, what they found, and how far apart they are.
-
-    Differences are those to the first run, with the ± of both added by squares.
-    """
-    comparison = alsph.compare(paths)
-    name = "_".join(comparison.runs).replace("/", "_")
-    say(f"{comparison}\n")
-    for path in comparison.save(output or Path("runs/comparison") / name[:LONGEST_NAME]):
-        say(path)
 
 
 @app.command("validate")

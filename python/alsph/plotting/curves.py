@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_TICKS = 7
-"""Of a logarithmic axis at the values that are drawn; those of more stand on each other."""
-
 
 def pressure_coefficient(
     coefficient: PressureCoefficient,
@@ -185,7 +182,7 @@ def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str
         if "x" in logarithmic:
             axes.set_xscale("log")
             ticks = sorted({x for curve in curves for x in curve.x})
-            if len(ticks) <= MOST_TICKS:
+            if len(ticks) <= max(len(curve.x) for curve in curves):  # else, of each its own, they stand on each other
                 axes.set_xticks(ticks, [f"{x:.3g}" for x in ticks])
                 axes.xaxis.minorticks_off()
         if "y" in logarithmic:

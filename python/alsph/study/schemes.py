@@ -189,7 +189,8 @@ class SchemeComparison:
         for row in self.rows:
             for name, measure in row.measures.items():
                 if np.isfinite([cost := row.numbers[CPU], measure.error]).all() and cost * measure.error:
-                    points = panels.setdefault(f"|error| of {name}", {}).setdefault(row.scheme, [])
+                    title = f"|error| of {name}" if measure.reference else name
+                    points = panels.setdefault(title, {}).setdefault(row.scheme, [])
                     points.append((cost, abs(measure.error)))
         curves = {
             name: [Curve(scheme, [x for x, _ in points], [y for _, y in points]) for scheme, points in schemes.items()]
