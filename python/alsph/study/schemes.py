@@ -133,7 +133,11 @@ class SchemeComparison:
                 if np.isnan(measure.value) and (note := getattr(measure.value, "note", "")):
                     why.setdefault(f"{row.label}: nan, as {note}", []).append(name)
         found += [f"{note}: {', '.join(names)}" for note, names in why.items()]
-        return found + [f"{row.label}: {told}" for row in self.rows if row.run and (told := keywords(row.run.remarks))]
+        said: dict[str, list[str]] = {}
+        for row in self.rows:
+            for remark in row.run.remarks if row.run else ():
+                said.setdefault(keywords([remark]), []).append(row.label)
+        return found + [f"{remark}: {'; '.join(dict.fromkeys(labels))}" for remark, labels in said.items()]
 
     def _times(self) -> list[str]:
         """Return how the times of the runs were taken, in words."""
