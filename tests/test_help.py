@@ -87,7 +87,8 @@ def test_a_parameter_that_must_be_given_says_so(alsph, tmp_path):
     [
         (["runs"], "runs [OPTIONS] [FOLDER]"),
         (["info"], "info [OPTIONS] RUN"),
-        (["compare"], "compare [OPTIONS] RUN RUN..."),
+        (["compare"], "compare RUN RUN... | CASE --schemes LIST [OPTIONS]"),
+        (["compare", "runs"], "compare runs [OPTIONS] RUN RUN..."),
         (["validate"], "validate [OPTIONS] [CASE...]"),
         (["run"], "run CASE|FILE.toml|FILE.py:CLASS [OPTIONS]"),
         (["study"], "study NAME|FILE.toml|COMMAND [OPTIONS]"),

@@ -109,7 +109,8 @@ def test_every_command_and_option_stands_in_the_reference(monkeypatch):
     text = "\n".join(described())
     assert re.findall(r"^### alsph (\w+)$", text, re.MULTILINE) == list(COMMANDS)
     assert re.findall(r"^#### alsph (\w+ \w+)$", text, re.MULTILINE) == [
-        f"study {name}" for name in ("run", "status", "draw", "list")
+        "compare runs",
+        *(f"study {name}" for name in ("run", "status", "draw", "list")),
     ]
     for name in COMMANDS.keys() - {"cases"}:
         section = re.split(r"^### alsph ", text, flags=re.MULTILINE)[1 + list(COMMANDS).index(name)]

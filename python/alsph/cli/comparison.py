@@ -89,8 +89,9 @@ app.add_typer(
         "are those to the first run. Schemes of a case are run first, each with its own step, where such runs are not "
         "there already: a table and figures of what each finds, how well it keeps the flow, and what it costs.",
         no_args_is_help=True,
-        subcommand_metavar="RUN RUN... | CASE|FILE.toml|FILE.py:CLASS --schemes LIST [OPTIONS]",
-        epilog=f"Of runs see alsph compare runs --help, of schemes CASE --help. Start with: {EXAMPLE}",
+        subcommand_metavar="RUN RUN... | CASE --schemes LIST [OPTIONS]",
+        epilog="CASE may be FILE.toml or FILE.py:CLASS, as elsewhere. See alsph compare runs --help, and CASE --help. "
+        f"Start with: {EXAMPLE}",
     ),
     name="compare",
 )
