@@ -173,6 +173,7 @@ def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str
     figure = blank(6.5 * columns, 4.5 * rows)
     grid = figure.subplots(rows, columns, squeeze=False).flat
     for axes, (name, curves) in zip(grid, panels.items(), strict=False):
+        axes.set(**{f"{axis}scale": "log" for axis in logarithmic})
         for index, curve in enumerate(curves):
             style = curve.style or f"{MARKERS[index % len(MARKERS)]}-"
             colour = curve.colour or PALETTE[index % len(PALETTE)]
@@ -180,13 +181,10 @@ def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str
             if np.nansum(curve.uncertainty) > 0:
                 axes.errorbar(curve.x, curve.y, curve.uncertainty, fmt="none", ecolor=colour, capsize=2, lw=1)
         if "x" in logarithmic:
-            axes.set_xscale("log")
             ticks = sorted({x for curve in curves for x in curve.x})
             if len(ticks) <= max(len(curve.x) for curve in curves):  # else, of each its own, they stand on each other
                 axes.set_xticks(ticks, [f"{x:.3g}" for x in ticks])
                 axes.xaxis.minorticks_off()
-        if "y" in logarithmic:
-            axes.set_yscale("log")
         axes.set(xlabel=label, ylabel=name)
         axes.grid(alpha=0.3)
         axes.legend(fontsize="small")
