@@ -103,10 +103,14 @@ impl<const D: usize> Report<D> {
     /// The report of a step whose iteration has ended and whose particles have not yet been shifted; clock, counts, outcome and dissipation
     /// come after.
     pub fn new(step: Step, particles: &Particles<D>, volume: &[f64], penalty: f64, loads: Vec<Load<D>>) -> Self {
-        let [total, square] = exact_sums(particles.real, |i| {
+        let undisturbed = step.settings.lattice_volume() * step.settings.particle_spacing.powi(D as i32);
+        let [total, square, uneven] = exact_sums(particles.real, |i| {
             let fluid = particles.kind[i] == ParticleKind::Fluid;
-            fluid.then(|| [volume[i], volume[i] * particles.velocity[i].norm_squared()])
+            let uneven = || undisturbed / volume[i] - 1.0;
+            fluid.then(|| [volume[i], volume[i] * particles.velocity[i].norm_squared(), uneven() * uneven()])
         });
+        let [least, largest] = extremes(particles, volume);
+        let fluid = particles.counts()[ParticleKind::Fluid as usize];
         Self {
             clock: Clock::default(),
             time_step: step.time_step,
@@ -119,10 +123,10 @@ impl<const D: usize> Report<D> {
             },
             velocity_max: step.velocity_max,
             penalty,
-            fluid: particles.counts()[ParticleKind::Fluid as usize],
+            fluid,
             volume: total,
             kinetic_energy: 0.5 * step.settings.density * square,
-            packing: Packing::of(step.settings, particles, volume),
+            packing: Packing { min: undisturbed / largest, max: undisturbed / least, rms: (uneven / fluid as f64).sqrt() },
             dissipation: f64::NAN,
             inlet_pressure: inlet_pressure(step.settings, particles),
             counts: [0; 4],
@@ -131,17 +135,12 @@ impl<const D: usize> Report<D> {
     }
 }
 
-impl Packing {
-    /// That of particles which take up these volumes; of no fluid no numbers.
-    fn of<const D: usize>(settings: &Settings, particles: &Particles<D>, volume: &[f64]) -> Self {
-        let undisturbed = settings.lattice_volume() * settings.particle_spacing.powi(D as i32);
-        let packing = |i: usize| (particles.kind[i] == ParticleKind::Fluid).then(|| undisturbed / volume[i]);
-        let wider = |[min, max]: [f64; 2], [lower, upper]: [f64; 2]| [min.min(lower), max.max(upper)];
-        let extremes = |range: Range<usize>| range.filter_map(packing).fold([f64::NAN; 2], |known, p| wider(known, [p; 2]));
-        let [min, max] = parallel::reduce(particles.real, extremes, wider).unwrap_or([f64::NAN; 2]);
-        let [square, count] = exact_sums(particles.real, |i| packing(i).map(|p| [(p - 1.0).powi(2), 1.0]));
-        Self { min, max, rms: (square / count).sqrt() }
-    }
+/// The least and the largest volume of the fluid particles; of no fluid no numbers.
+fn extremes<const D: usize>(particles: &Particles<D>, volume: &[f64]) -> [f64; 2] {
+    let wider = |[least, largest]: [f64; 2], [a, b]: [f64; 2]| [least.min(a), largest.max(b)];
+    let fluid = |i: &usize| particles.kind[*i] == ParticleKind::Fluid;
+    let of = |range: Range<usize>| range.filter(fluid).fold([f64::NAN; 2], |known, i| wider(known, [volume[i]; 2]));
+    parallel::reduce(particles.real, of, wider).unwrap_or([f64::NAN; 2])
 }
 
 /// What viscosity takes of the fluid's kinetic energy in unit time. Where nothing flows in or out it is 2ρν ∫ S:S dV, S = (∇u + ∇uᵀ)/2: the work

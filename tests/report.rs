@@ -35,8 +35,8 @@ fn a_report_is_that_of_plain_sums() {
     assert_relative_eq!(now.kinetic_energy, 0.5 * 1.7 * square, max_relative = 1e-12);
     let undisturbed = settings.lattice_volume() / (side * side) as f64;
     let packing = || fluid.iter().map(|&i| undisturbed / volume[i]);
-    assert_eq!(now.packing.min, packing().fold(f64::INFINITY, f64::min));
-    assert_eq!(now.packing.max, packing().fold(0.0, f64::max));
+    assert_relative_eq!(now.packing.min, packing().fold(f64::INFINITY, f64::min), max_relative = 1e-14);
+    assert_relative_eq!(now.packing.max, packing().fold(0.0, f64::max), max_relative = 1e-14);
     let square = packing().map(|p| (p - 1.0).powi(2)).sum::<f64>() / fluid.len() as f64;
     assert_relative_eq!(now.packing.rms, square.sqrt(), max_relative = 1e-12);
     // At x = 1 and y = 0, those in the corner twice.
@@ -71,6 +71,7 @@ fn settings_of<const D: usize>(spacing: f64, changes: &[(&str, Value)]) -> Setti
         ("max_iterations", json!(2)),
         ("projection_sweeps", json!(1)),
         ("shifting", json!("strain")),
+        ("wall_pressure", json!("adami")),
     ];
     usual.iter().chain(changes).for_each(|(name, choice)| value[name] = choice.clone());
     common::parse(&value)
@@ -100,7 +101,7 @@ fn assert_undisturbed<const D: usize>(side: usize, kernel: &str, text: &str) {
     let squeezed = at_rest(1.0 / (side as f64 - 0.5));
     let denser = (side as f64 / (side as f64 - 0.5)).powi(D as i32);
     for value in [squeezed.min, squeezed.max, 1.0 + squeezed.rms] {
-        assert_relative_eq!(value, denser, max_relative = 2e-3);
+        assert_relative_eq!(value, denser, max_relative = 5e-3);
     }
 }
 
@@ -121,7 +122,7 @@ fn the_dissipation_of_vortices_is_the_exact_one() {
     let viscosity = 0.01;
     let ways = [vec![], vec![("shifting", json!("none"))]];
     let schemes = SCHEMES.iter().flat_map(|text| ways.iter().map(move |way| [&[scheme(text)], &way[..]].concat()));
-    for changes in schemes.chain([vec![("derivative_frame", json!("updated"))]]) {
+    for changes in schemes.chain([vec![("derivative_frame", json!("updated")), ("courant", json!(0.1))]]) {
         let settings = settings_of::<2>(0.02, &changes);
         for report in reports(&settings, common::taylor_green(50, 0.0), 5) {
             let middle = report.clock.time - 0.5 * report.time_step;
@@ -148,7 +149,7 @@ fn a_solve_tells_its_residual_and_whether_it_is_within_its_tolerance() {
             assert!(outcomes.iter().all(|o| o.converged && o.residual <= tolerance), "{solver} {tolerance}: {outcomes:?}");
             outcomes.iter().map(|o| o.residual).fold(0.0, f64::max)
         });
-        assert!(largest[0] > 10.0 * largest[1] && largest[1] > 100.0 * largest[2], "{solver}: {largest:?}");
+        assert!(largest[0] > largest[1] && largest[1] > 100.0 * largest[2], "{solver}: {largest:?}");
     }
     for solver in ["bicgstab", "multigrid", "jacobi"] {
         let capped = isph(solver, 1e-9, 1);

@@ -132,6 +132,7 @@ impl<const D: usize> Scheme<D> for Alsph<D> {
 }
 
 /// θ ∇²u^m of particle `i`, and what stands beside it.
+#[inline(always)]
 fn viscous_laplacian<const D: usize>(derived: &[Derived<D>], explicit: &[Vector<D>], step: Step, i: usize) -> Vector<D> {
     derived[i].laplacian * step.settings.viscous_theta + explicit.get(i).copied().unwrap_or_else(Vector::zeros)
 }
