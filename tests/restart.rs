@@ -32,14 +32,14 @@ const FACTORS: [(&str, &[&str]); 19] = [
     ("prescribed", &["nothing", "force and surfaces"]),
     ("wall_velocity", &["paper", "adami", "cubic", "morris"]),
     ("wall_pressure", &["paper", "adami", "linear"]),
-    ("derivative_frame", &["midpoint", "updated", "initial", "updated, searched in every iteration"]),
+    ("derivative_frame", &["midpoint", "updated", "initial", "updated, searched in every iteration"]), // updated by u^n in isph
     (
         "scheme",
         &[
             r#"{"kind": "alsph"}"#,
             r#"{"kind": "wcsph", "sound_speed": 10, "density_diffusion": "antuono", "diffusion_coefficient": 0.1}"#,
             r#"{"kind": "edac", "sound_speed": 10, "diffusion_coefficient": 0.5}"#,
-            r#"{"kind": "isph", "pressure_share": 0.9, "solver": "bicgstab", "tolerance": 1e-3, "max_solver_iterations": 10}"#,
+            r#"{"kind": "isph", "pressure_share": 0.9, "solver": "bicgstab", "tolerance": 1e-3, "max_solver_iterations": 10, "density_relaxation": 0.01}"#,
             r#"{"kind": "isph", "pressure_share": 0, "solver": "multigrid", "tolerance": 0, "max_solver_iterations": 2}"#,
             r#"{"kind": "explicit_isph", "sweeps": 2, "mach_number": 0.1}"#,
             r#"{"kind": "isph", "pressure_share": 1, "solver": "jacobi", "tolerance": 0.1, "max_solver_iterations": 9}"#,
@@ -132,7 +132,7 @@ fn settings<const D: usize>(configuration: &Configuration, spacing: f64) -> Valu
         }
     }
     if value["scheme"]["kind"].as_str().is_some_and(|kind| kind.contains("isph")) && value["derivative_frame"] == "updated" {
-        (value["derivative_frame"], value["search_every_iteration"]) = ("initial".into(), false.into());
+        (value["derivative_frame"], value["search_every_iteration"]) = ("predicted".into(), false.into());
     }
     value["max_iterations"] = 2.into();
     value["body_force"] = json!([0.2, -0.1, 0.1][..D]);

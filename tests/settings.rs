@@ -154,6 +154,8 @@ fn eigenvalues_and_dispersion_are_those_of_plain_sums() {
 fn only_the_frame_in_the_middle_lies_ahead() {
     let fraction = |frame: &str| common::parse(&with(&[("/derivative_frame", frame.into())])).derivative_frame.fraction();
     assert_eq!(["initial", "updated", "midpoint"].map(fraction), [0.0, 0.0, 0.5]);
+    let predicted = Settings::from_json(&with(&[("/derivative_frame", "predicted".into())]).to_string());
+    assert!(predicted.expect_err("not with ALSPH").to_string().contains("derivative_frame"));
 }
 
 #[test]
@@ -174,13 +176,14 @@ fn a_weakly_compressible_scheme_has_parameters_of_its_own() {
         let text = refused(&[("/velocity_laplacian", json!("scalar")), ("/wall_pressure", json!("linear")), (pointer, bad)]);
         assert!(text.contains(word), "{text}");
     }
-    let isph =
-        json!({"kind": "isph", "pressure_share": 0.9, "solver": "bicgstab", "tolerance": 1e-3, "max_solver_iterations": 9});
+    let isph = json!({"kind": "isph", "pressure_share": 0.9, "solver": "bicgstab", "tolerance": 1e-3, "max_solver_iterations": 9,
+               "density_relaxation": 0.0});
     for (pointer, bad, word) in [
         ("/scheme/pressure_share", json!(1.1), "scheme.pressure_share"),
         ("/scheme/tolerance", json!(-1.0), "scheme.tolerance"),
         ("/scheme/max_solver_iterations", json!(0), "scheme.max_solver_iterations"),
         ("/scheme/solver", json!("cg"), "cg"),
+        ("/scheme/density_relaxation", json!(1.5), "scheme.density_relaxation"),
         ("/derivative_frame", json!("updated"), "derivative_frame"),
         ("/scheme", json!({"kind": "explicit_isph", "sweeps": 0, "mach_number": 0.1}), "scheme.sweeps"),
         ("/scheme", json!({"kind": "explicit_isph", "sweeps": 1, "mach_number": 0.0}), "scheme.mach_number"),

@@ -4,8 +4,7 @@
 //! half of it on fluid particles, half on solid ones, which have no equations. A Poisson equation whose right-hand side lacks that half makes
 //! half of the pressure gradient that would stop the fluid at the wall. So each solid hands what it sees to the fluid around.
 //!
-//! Solids at corners do not: one normal does not tell to which surface a flux belongs, and at the corners of a lid there is none to
-//! be told.
+//! Solids at corners need not: one normal does not tell to which surface a flux belongs, and where a lid meets a wall at rest the flow has none.
 
 use crate::base::{Vector, parallel};
 use crate::boundary::average::for_each_weighted;
@@ -14,24 +13,27 @@ use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 use rayon::prelude::*;
 
-/// A surface that turns by so much (the cosine) within so many spacings has a corner.
+/// A surface that turns by so much (the cosine) within so many spacings has a corner, as solids tell within this share of the support. No
+/// distances of lattices, at which rounding would decide.
 const TURN: f64 = 0.72;
-const CORNER_REACH: f64 = 2.5;
+const CORNER_REACH: f64 = 2.6;
+const CORNER_SIGHT: f64 = 0.93;
 
 /// Add to `divergence`, that of `velocity` at the real particles, what solid particles see of it: each gives the integral over its volume to
-/// the flowing particles around, in proportion to the kernel. `handed` is memory to be used.
+/// the flowing particles around, in proportion to the kernel, those at corners only if `corners`. `handed` is memory to be used.
 pub fn add_wall_flux<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
     frame: &Frame<D>,
     velocity: impl Fn(usize) -> Vector<D> + Sync,
+    corners: bool,
     handed: &mut Vec<f64>,
     divergence: &mut [f64],
 ) {
     let stencil = &frame.stencil;
     let is_solid = |i: &usize| particles.kind[*i] == ParticleKind::Solid;
     let share = |s: usize| {
-        if is_at_corner(settings, particles, frame, s) {
+        if !corners && is_at_corner(settings, particles, frame, s) {
             return 0.0;
         }
         let (row, lane) = stencil.neighbours.row(s);
@@ -72,11 +74,14 @@ pub fn add_wall_flux<const D: usize>(
 /// Whether the surface above solid `s` turns sharply nearby.
 fn is_at_corner<const D: usize>(settings: &Settings, particles: &Particles<D>, frame: &Frame<D>, s: usize) -> bool {
     let Particles { normal, depth, .. } = particles;
-    let surface = |s: usize| frame.stencil.position[s] + normal[s] * depth[s];
-    let (here, reach) = (surface(s), CORNER_REACH * settings.particle_spacing);
+    let position = &frame.stencil.position;
+    let surface = |s: usize| position[s] + normal[s] * depth[s];
+    let (reach, sight) = (CORNER_REACH * settings.particle_spacing, CORNER_SIGHT * settings.support_radius());
     let (row, lane) = frame.stencil.neighbours.row(s);
     row.solid_seen(lane).any(|(entry, _)| {
         let k = entry.j();
-        normal[k].dot(&normal[s]) < TURN && (surface(k) - here).norm_squared() < reach * reach
+        normal[k].dot(&normal[s]) < TURN
+            && (position[k] - position[s]).norm() < sight
+            && (surface(k) - surface(s)).norm() < reach
     })
 }

@@ -33,12 +33,14 @@ pub struct Solution {
     pub iterations: usize,
     /// ‖f + ∇²x‖ / ‖f‖, NaN where it was not looked at.
     pub residual: f64,
+    pub within_tolerance: bool,
 }
 
 /// When a solve ends.
 #[derive(Clone, Copy, Debug)]
 pub struct Goal {
-    /// Residual that is small enough. With none to reach, all iterations are taken, and what the last of them leaves is not looked at.
+    /// Residual that is small enough; of Jacobi's iteration, whose residual falls slowly, the change of x in one, Σ|Δx| / Σ|x| (Muta,
+    /// Ramachandran and Negi 2020). With none to reach, all iterations are taken, and what the last of them leaves is not looked at.
     pub tolerance: f64,
     pub max_iterations: usize,
     /// Damping of Jacobi's iteration.
@@ -114,11 +116,14 @@ impl<const D: usize> Poisson<D> {
         parallel::for_each(&mut residual, |i, residual| *residual = source[i] - *residual);
         self.residual = residual;
         let relative = |residual: &[f64]| if scale > 0.0 { norm(residual) / scale } else { 0.0 };
-        let mut solution = Solution { iterations: 0, residual: relative(&self.residual) };
-        let solved = |residual: f64| residual <= goal.tolerance || !residual.is_finite();
+        let mut solution = Solution { iterations: 0, residual: relative(&self.residual), within_tolerance: false };
+        solution.within_tolerance = solution.residual <= if solver == Solver::Jacobi { 0.0 } else { goal.tolerance };
         let mut state = Krylov::default();
         let mut least = (solution.residual, 0);
-        while solution.iterations < goal.max_iterations.min(least.1 + PATIENCE) && !solved(solution.residual) {
+        while solution.iterations < goal.max_iterations.min(least.1 + PATIENCE)
+            && solution.residual.is_finite()
+            && !solution.within_tolerance
+        {
             let last = goal.tolerance == 0.0 && solution.iterations + 1 == goal.max_iterations;
             match solver {
                 Solver::Jacobi | Solver::Multigrid => {
@@ -136,6 +141,10 @@ impl<const D: usize> Poisson<D> {
             }
             solution.iterations += 1;
             solution.residual = if last && solver != Solver::Bicgstab { f64::NAN } else { relative(&self.residual) };
+            solution.within_tolerance = match solver {
+                Solver::Jacobi => goal.tolerance > 0.0 && self.change(x) <= goal.tolerance,
+                Solver::Multigrid | Solver::Bicgstab => solution.residual <= goal.tolerance,
+            };
             if solution.residual < FALL * least.0 {
                 least = (solution.residual, solution.iterations);
             }
@@ -173,6 +182,12 @@ impl<const D: usize> Poisson<D> {
         (self.correction, self.residual) = (correction, residual);
         let correction = &self.correction;
         parallel::for_each(&mut self.step, |i, step| *step = correction[i]);
+    }
+
+    /// Σ|Δx| / Σ|x| of the step.
+    fn change(&self, x: &[f64]) -> f64 {
+        let [changes, sizes] = exact_sums(self.step.len(), |i| Some([self.step[i].abs(), x[i].abs()]));
+        if changes > 0.0 { changes / sizes } else { 0.0 }
     }
 
     /// What the step does to the residual.

@@ -5,7 +5,8 @@
 //! ```
 //!
 //! with the compact Laplacian, so that a divergence of the order Δx² stays (an approximate projection). β = 0 solves the pressure anew (Cummins and
-//! Rudman 1999; Shadloo et al. 2011), β = 1 its change. θ is [`DerivativeFrame::solenoidal_divergence`]. Solids show q with ∂q/∂n = 0
+//! Rudman 1999; Shadloo et al. 2011), β = 1 its change. θ is [`DerivativeFrame::solenoidal_divergence`], and with a density that is
+//! constrained, too, α (n/n₀ − 1)/Δt beside it, of the number density n and the lattice's n₀. Solids show q with ∂q/∂n = 0
 //! to the Laplacian, and the fluid has their share of the flux into walls ([`add_wall_flux`]); to the gradient they show the pressure of the
 //! rule for walls.
 //!
@@ -40,6 +41,10 @@ pub struct Isph<const D: usize> {
     goal: Goal,
     /// J Δx²/a of an explicit pressure, whose waves have the square of the speed J Δx²/(a Δt²); NaN of a solved one.
     relaxed: f64,
+    /// α.
+    density_relaxation: f64,
+    /// V of a particle of the undisturbed lattice.
+    undisturbed: f64,
     largest: Eigenvalues,
     sweeps: Sweeps,
     viscous: Viscous<D>,
@@ -63,27 +68,35 @@ pub struct Isph<const D: usize> {
 
 impl<const D: usize> Isph<D> {
     pub fn new(settings: &Settings, own: ProjectionSettings) -> Self {
-        let ProjectionSettings { pressure_share, solver, tolerance, max_solver_iterations } = own;
-        let goal = Goal { tolerance, max_iterations: max_solver_iterations, damping: JACOBI_DAMPING };
-        Self::with(settings, pressure_share, solver, goal, f64::NAN)
+        Self::with(settings, own, JACOBI_DAMPING, f64::NAN)
     }
 
     /// With so many steps of Jacobi's iteration from the old pressure in place of a solve (Hosseini, Manzari and Hannani 2007; Rafiee and
     /// Thiagarajan 2009; Barcarolo et al. 2012): as waves of the speed √(J/a) Δx/Δt, whose divergence a step takes off.
-    pub fn explicit(settings: &Settings, sweeps: usize) -> Self {
+    pub fn explicit(settings: &Settings, sweeps: usize, density_relaxation: f64) -> Self {
         let damping = if sweeps == 1 { 1.0 } else { SEVERAL_DAMPING };
         let relaxed = sweeps as f64 * settings.particle_spacing.powi(2) / settings.laplacian_diagonal();
-        let goal = Goal { tolerance: 0.0, max_iterations: sweeps, damping };
-        Self::with(settings, 0.0, Solver::Jacobi, goal, relaxed)
+        let solve = ProjectionSettings {
+            pressure_share: 0.0,
+            solver: Solver::Jacobi,
+            tolerance: 0.0,
+            max_solver_iterations: sweeps,
+            density_relaxation,
+        };
+        Self::with(settings, solve, damping, relaxed)
     }
 
-    fn with(settings: &Settings, pressure_share: f64, solver: Solver, goal: Goal, relaxed: f64) -> Self {
+    fn with(settings: &Settings, own: ProjectionSettings, damping: f64, relaxed: f64) -> Self {
+        let ProjectionSettings { pressure_share, solver, tolerance, max_solver_iterations, density_relaxation } = own;
+        let goal = Goal { tolerance, max_iterations: max_solver_iterations, damping };
         let largest = settings.largest_eigenvalues();
         Self {
             pressure_share,
             solver,
             goal,
             relaxed,
+            density_relaxation,
+            undisturbed: settings.lattice_volume() * settings.particle_spacing.powi(D as i32),
             largest,
             sweeps: Sweeps::new(settings, largest),
             viscous: Viscous::new(settings),
@@ -100,13 +113,16 @@ impl<const D: usize> Isph<D> {
         }
     }
 
+    fn is_explicit(&self) -> bool {
+        self.relaxed.is_finite()
+    }
+
     /// How a solve ended, of an explicit pressure how many steps it took.
-    fn solved(&self, Solution { iterations, residual }: Solution) -> Solved {
-        if self.relaxed.is_finite() {
+    fn solved(&self, Solution { iterations, residual, within_tolerance }: Solution) -> Solved {
+        if self.is_explicit() {
             return Solved::after(iterations);
         }
-        let tolerance = self.goal.tolerance;
-        Solved { iterations, residual, within_tolerance: (tolerance > 0.0).then_some(residual <= tolerance) }
+        Solved { iterations, residual, within_tolerance: (self.goal.tolerance > 0.0).then_some(within_tolerance) }
     }
 
     /// The pressure that images and solids show.
@@ -117,11 +133,12 @@ impl<const D: usize> Isph<D> {
     /// u*. Buffers and solids keep their velocities.
     fn predict_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
         let share = self.pressure_share;
-        self.extend_pressure(step.settings, flow);
+        if share > 0.0 {
+            self.extend_pressure(step.settings, flow);
+        }
         let Flow { particles, frame, body_force, .. } = flow;
         frame.images.blank(&mut self.base, particles.len());
-        self.base.copy_from_slice(&particles.pressure);
-        parallel::for_each(&mut self.base, |_, p| *p *= share);
+        parallel::for_each(&mut self.base, |i, p| *p = if share > 0.0 { share * particles.pressure[i] } else { 0.0 });
         frame.images.blank(&mut self.velocity_star, particles.len());
         let (velocity, viscous) = (&particles.velocity, &self.viscous);
         let condition = conditions(step.settings);
@@ -141,13 +158,23 @@ impl<const D: usize> Isph<D> {
         frame.images.fill(&mut self.velocity_star);
     }
 
+    /// Let θ take off α of the error of the number density.
+    fn constrain_density(&mut self, step: Step, volume: &[f64]) {
+        let (factor, undisturbed) = (self.density_relaxation / step.time_step, self.undisturbed);
+        if factor > 0.0 {
+            parallel::for_each(&mut self.solenoidal, |i, theta| *theta += factor * (undisturbed / volume[i] - 1.0));
+        }
+    }
+
     /// −ρ/Δt (∇·u* − θ), as the equation of each particle has it.
     fn form_source(&mut self, step: Step, Flow { particles, frame, .. }: &Flow<D>) {
         frame.images.blank(&mut self.source, particles.real);
         let star = &self.velocity_star;
         frame.stencil.for_each_one(Divergence(star), &mut self.source, |_, divergence, out| *out = divergence);
         let flux_of = |j: usize| star[j] - particles.velocity[j] * ANSWERED;
-        add_wall_flux(step.settings, particles, frame, flux_of, &mut self.handed, &mut self.source);
+        // A pressure that begins anew in every step has but this one to answer.
+        let corners = self.pressure_share == 0.0 && !self.is_explicit();
+        add_wall_flux(step.settings, particles, frame, flux_of, corners, &mut self.handed, &mut self.source);
         let (condition, factor) = (conditions(step.settings), step.settings.density / step.time_step);
         parallel::for_each(&mut self.source, |i, source| {
             *source = match condition(particles.kind[i], &particles.position[i]).pressure {
@@ -186,6 +213,7 @@ impl<const D: usize> Scheme<D> for Isph<D> {
         let (frame, time_step) = (step.settings.derivative_frame, step.time_step);
         let solenoidal = |gradient: &Matrix<D>| frame.solenoidal_divergence(gradient, time_step);
         self.viscous.begin(step, flow, &mut self.solenoidal, solenoidal);
+        self.constrain_density(step, &flow.frame.stencil.volume);
         self.predict_velocity(step, flow);
         self.form_source(step, flow);
         let Flow { particles, frame, .. } = &mut *flow;

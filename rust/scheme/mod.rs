@@ -43,7 +43,9 @@ pub fn build<const D: usize>(settings: &Settings) -> Box<dyn Scheme<D>> {
     match settings.scheme {
         SchemeSettings::Alsph => Box::new(Alsph::new(settings)),
         SchemeSettings::Isph(own) => Box::new(Isph::new(settings, own)),
-        SchemeSettings::ExplicitIsph { sweeps, .. } => Box::new(Isph::explicit(settings, sweeps)),
+        SchemeSettings::ExplicitIsph { sweeps, density_relaxation, .. } => {
+            Box::new(Isph::explicit(settings, sweeps, density_relaxation))
+        }
         SchemeSettings::Wcsph { sound_speed, density_diffusion, diffusion_coefficient } => {
             Box::new(WeaklyCompressible::new(settings, sound_speed, density_diffusion, diffusion_coefficient))
         }

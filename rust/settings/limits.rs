@@ -41,7 +41,7 @@ impl Settings {
         let spacing = self.particle_spacing;
         match self.scheme {
             SchemeSettings::Alsph | SchemeSettings::Isph(_) => f64::INFINITY,
-            SchemeSettings::ExplicitIsph { sweeps, mach_number } => {
+            SchemeSettings::ExplicitIsph { sweeps, mach_number, .. } => {
                 mach_number * (sweeps as f64 / self.laplacian_diagonal()).sqrt() * spacing / velocity_max
             }
             SchemeSettings::Wcsph { sound_speed, .. } | SchemeSettings::Edac { sound_speed, .. } => {

@@ -177,9 +177,19 @@ impl Settings {
 
     fn validate_scheme(&self) -> Result<()> {
         match self.scheme {
+            SchemeSettings::Alsph if self.derivative_frame == DerivativeFrame::Predicted => {
+                return Err(setting(
+                    "derivative_frame",
+                    "must be \"updated\", \"initial\" or \"midpoint\" in the scheme alsph",
+                ));
+            }
             SchemeSettings::Alsph => return Ok(()),
             SchemeSettings::Isph(own) => own.validate()?,
-            SchemeSettings::ExplicitIsph { sweeps, mach_number } => {
+            SchemeSettings::ExplicitIsph { sweeps, mach_number, density_relaxation } => {
+                if !(0.0..=1.0).contains(&density_relaxation) {
+                    let problem = format!("must lie in 0..1, not {density_relaxation}");
+                    return Err(setting("scheme.density_relaxation", problem));
+                }
                 if !(1.0..=MOST_PASSES).contains(&(sweeps as f64)) {
                     return Err(setting("scheme.sweeps", format!("must lie in 1..{MOST_PASSES}, not {sweeps}")));
                 }
@@ -201,7 +211,7 @@ impl Settings {
         }
         let projects = matches!(self.scheme, SchemeSettings::Isph(_) | SchemeSettings::ExplicitIsph { .. });
         if projects && self.derivative_frame == DerivativeFrame::Updated {
-            return Err(setting("derivative_frame", "must be \"initial\" or \"midpoint\" in this scheme"));
+            return Err(setting("derivative_frame", "must be \"initial\", \"predicted\" or \"midpoint\" in this scheme"));
         }
         if self.velocity_laplacian == VelocityLaplacian::Vector {
             return Err(setting("velocity_laplacian", "must be \"scalar\" but in the scheme alsph"));

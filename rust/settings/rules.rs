@@ -20,6 +20,9 @@ pub enum SchemeSettings {
         sweeps: usize,
         /// Largest artificial Mach number, which bounds the step.
         mach_number: f64,
+        /// As [`ProjectionSettings::density_relaxation`].
+        #[serde(default)]
+        density_relaxation: f64,
     },
     /// Weakly compressible SPH.
     Wcsph {
@@ -45,9 +48,13 @@ pub struct ProjectionSettings {
     /// β: how much of the old pressure the predicted velocity has felt.
     pub pressure_share: f64,
     pub solver: Solver,
-    /// Largest ‖f + ∇²x‖ / ‖f‖ that a solve ends with.
+    /// Largest ‖f + ∇²x‖ / ‖f‖ that a solve ends with; of Jacobi's iteration the largest change of x in one, Σ|Δx| / Σ|x|.
     pub tolerance: f64,
     pub max_solver_iterations: usize,
+    /// α: how much of the error of the number density a step takes off beside ∇·u. 0: that of ∇·u alone; 1: the density, as Shao and Lo
+    /// (2003) have it, to first order in Δt; small values hold it in the long run (Asai et al. 2012).
+    #[serde(default)]
+    pub density_relaxation: f64,
 }
 
 impl ProjectionSettings {
@@ -55,6 +62,7 @@ impl ProjectionSettings {
         for (name, value, lowest, highest) in [
             ("scheme.pressure_share", self.pressure_share, 0.0, 1.0),
             ("scheme.tolerance", self.tolerance, 0.0, 1.0),
+            ("scheme.density_relaxation", self.density_relaxation, 0.0, 1.0),
             ("scheme.max_solver_iterations", self.max_solver_iterations as f64, 1.0, MOST_PASSES),
         ] {
             if !(lowest..=highest).contains(&value) {
@@ -96,6 +104,8 @@ pub enum DerivativeFrame {
     Updated,
     /// Algorithm 2: ⟨ ⟩ at r^n.
     Initial,
+    /// ⟨ ⟩ at r^n + u^n Δt (Cummins and Rudman 1999). Not with ALSPH.
+    Predicted,
     /// ⟨ ⟩ at r^n + ½ u^n Δt, where u^{n+1} is given the divergence that makes it solenoidal at r^{n+1}: of second order in time.
     Midpoint,
 }
@@ -103,15 +113,18 @@ pub enum DerivativeFrame {
 impl DerivativeFrame {
     /// How far of the way u^n Δt the frame lies before the iteration.
     pub fn fraction(self) -> f64 {
-        if self == Self::Midpoint { 0.5 } else { 0.0 }
+        match self {
+            Self::Updated | Self::Initial => 0.0,
+            Self::Midpoint => 0.5,
+            Self::Predicted => 1.0,
+        }
     }
 
     /// The ∇·u that a u^{n+1} of this ∇u, solenoidal once the particles have moved, has in the frame: in the middle of the step, half a
-    /// step before r^{n+1}, it is ½Δt tr (∇u)². Zero in the paper's algorithms.
+    /// step before r^{n+1}, it is ½Δt tr (∇u)². Zero in the paper's algorithms, and where the frame is r^{n+1} to second order.
     #[inline(always)]
     pub fn solenoidal_divergence<const D: usize>(self, gradient: &Matrix<D>, time_step: f64) -> f64 {
-        let lead = self.fraction() * time_step;
-        if lead > 0.0 { lead * (gradient * gradient).trace() } else { 0.0 }
+        if self == Self::Midpoint { 0.5 * time_step * (gradient * gradient).trace() } else { 0.0 }
     }
 }
 

@@ -417,7 +417,7 @@ class Case(Driven):
 
         It is infinite with a Poisson equation for the pressure.
         """
-        if self.scheme == "isph":
+        if self.is_projection:
             return math.inf
         if self.scheme == "explicit_isph":
             share = self.expected_time_step() / self.time_step_limits()["acoustic"]

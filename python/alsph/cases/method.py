@@ -31,17 +31,48 @@ PAPER = {"time_step": 0.0508, "penalty_constant": 100.0}
 """ΔtU/Δx and C_BV where only one of them is given."""
 
 
+SCHEMES = ("alsph", "isph", "explicit_isph", "wcsph", "edac", "shadloo", "sisph")
+
+_ANEW = {"algorithm": 2, "pressure_share": 0.0, "projection_sweeps": 1, "viscous_order": 2}
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "shadloo": _ANEW | {"shifting": "maximum_velocity"},
+    "sisph": _ANEW
+    | {"solver": "jacobi", "solver_tolerance": 0.05, "solver_iterations": 1000, "wall_pressure": "adami"},
+}
+"""Projection ISPH as papers have it: the parameters that each has for its own where nothing else is given."""
+
+_ISPH = ("isph", *PRESETS)
+
+
 def _as_in_the_paper(values: Mapping[str, Any]) -> bool:
     """Whether values ask for the paper's time step and penalty: by one of them, or by an algorithm of first order."""
     return any(values.get(name) is not None for name in PAPER) or values.get("algorithm") not in (None, "midpoint")
+
+
+_FOLLOWING = {"wall_pressure", "projection_sweeps", "shifting", *_ANEW} - {"pressure_share"}
+"""Parameters with a value of their own that a scheme may have for another."""
 
 
 def _goes_with(scheme: Any) -> dict[str, Any]:
     """Return what goes with a scheme where nothing else is given."""
     return {
         "wall_pressure": "adami" if scheme in tuple(DIFFUSION) else "linear",
-        "projection_sweeps": 1 if scheme == "isph" else 0 if scheme == "explicit_isph" else 4,
+        "projection_sweeps": 1 if scheme in ("isph", "explicit_isph") else 4,
+        **(PRESETS.get(scheme, {}) if isinstance(scheme, str) else {}),
     }
+
+
+def _defaults(scheme: Any, dimensions: int) -> dict[str, Any]:
+    """Return the values that a scheme has of all parameters which depend on the scheme, where nothing else is given."""
+    own = _goes_with(scheme)
+    found = {name: Method.model_fields[name].default for name in _FOLLOWING} | own
+    return found | {"shift_coefficient": _shift_coefficient(found["shifting"], dimensions)}
+
+
+def _shift_coefficient(shifting: Any, dimensions: Any) -> float:
+    strain = 0.25 if dimensions == 3 else 0.75  # in 3-D more neighbours push
+    return strain if shifting in (None, "strain") else 0.04
 
 
 def superseded(changes: Mapping[str, Any], before: Mapping[str, Any]) -> tuple[str, ...]:
@@ -56,7 +87,8 @@ def superseded(changes: Mapping[str, Any], before: Mapping[str, Any]) -> tuple[s
         others += ("shift_coefficient",)
     schemes = [table.get("scheme") or "alsph" for table in (before, {**before, **changes})]
     if schemes[0] != schemes[1]:
-        others += tuple(name for name, value in _goes_with(schemes[0]).items() if before.get(name) == value)
+        defaults = _defaults(schemes[0], before.get("dimensions") or 2)
+        others += tuple(name for name, value in defaults.items() if before.get(name) == value)
     if changes.get("units") is not None:
         others += ("reynolds",)
     if changes.get("courant") is not None:
@@ -64,14 +96,13 @@ def superseded(changes: Mapping[str, Any], before: Mapping[str, Any]) -> tuple[s
     return ("courant", *others) if _as_in_the_paper(changes) else others
 
 
-SCHEMES = ("alsph", "isph", "explicit_isph", "wcsph", "edac")
-
 OWN = {
     "penalty_constant": ("alsph",),
-    "solver": ("isph",),
-    "solver_tolerance": ("isph",),
-    "solver_iterations": ("isph", "explicit_isph"),
-    "pressure_share": ("isph",),
+    "solver": _ISPH,
+    "solver_tolerance": _ISPH,
+    "solver_iterations": (*_ISPH, "explicit_isph"),
+    "pressure_share": _ISPH,
+    "density_relaxation": (*_ISPH, "explicit_isph"),
     "mach_number": ("explicit_isph",),
     "sound_speed": ("wcsph", "edac"),
     "density_diffusion": ("wcsph",),
@@ -79,7 +110,7 @@ OWN = {
 }
 """The schemes that a parameter belongs to, of those that do not belong to all."""
 
-OWNERS = OWN | {"algorithm": ("alsph",)}
+OWNERS = OWN | {"algorithm": ("alsph", *_ISPH, "explicit_isph")}
 """The same with what others have, too, but for one value."""
 
 DIFFUSION = {"wcsph": 0.1, "edac": 0.5}
@@ -88,7 +119,7 @@ DIFFUSION = {"wcsph": 0.1, "edac": 0.5}
 
 def of_all_schemes(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return those of a case's parameters that hold whatever its scheme: not its own, nor what follows from it."""
-    follows = _goes_with(values.get("scheme")) | {"courant": COURANT}
+    follows = _defaults(values.get("scheme"), values.get("dimensions") or 2) | {"courant": COURANT}
     if values.get("penalty_constant") is not None:
         follows["time_step"] = PAPER["time_step"]
     left_out = {"scheme", *OWNERS, *(name for name, value in follows.items() if values.get(name) == value)}
@@ -96,9 +127,11 @@ def of_all_schemes(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def of_scheme(scheme: str, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return those of a case's parameters that belong to a scheme and are not what it has by default."""
+    """Return those of a case's parameters that belong to a scheme and are not what its own has by default."""
+    defaults = _goes_with(values.get("scheme"))
     own = {name: value for name, value in values.items() if scheme in OWNERS.get(name, ())}
-    return {name: value for name, value in own.items() if value not in (None, Method.model_fields[name].default)}
+    default = {name: (None, defaults.get(name, Method.model_fields[name].default)) for name in own}
+    return {name: value for name, value in own.items() if value not in default[name]}
 
 
 class Method(Parameters):
@@ -107,10 +140,11 @@ class Method(Parameters):
     in_space: ClassVar[int] = 2
     """Number of space dimensions of a case without a parameter for it."""
 
-    scheme: Literal["alsph", "isph", "explicit_isph", "wcsph", "edac"] | None = Field(
+    scheme: Literal["alsph", "isph", "explicit_isph", "wcsph", "edac", "shadloo", "sisph"] | None = Field(
         default=None,
-        description="augmented Lagrangian SPH, projection ISPH, explicit ISPH, weakly compressible SPH, or "
-        "entropically damped artificial compressibility; alsph if not given",
+        description="augmented Lagrangian SPH, projection ISPH, explicit ISPH, weakly compressible SPH, entropically "
+        "damped artificial compressibility, or isph set as Shadloo et al. 2011 or Muta et al. 2020 (sisph) have it; "
+        "alsph if not given",
     )
     sound_speed: float | None = Field(
         default=None, gt=0, description="speed of sound of wcsph and edac, 10 if not given [U]"
@@ -132,7 +166,8 @@ class Method(Parameters):
         default=None,
         ge=0,
         lt=1,
-        description="relative residual that a solve of isph ends with, 1e-3 if not given [-]",
+        description="relative residual that a solve of isph ends with, or of jacobi the change of an iteration; "
+        "1e-3 if not given [-]",
     )
     solver_iterations: int | None = Field(
         default=None,
@@ -147,6 +182,13 @@ class Method(Parameters):
         le=1,
         description="how much of the old pressure isph's predicted velocity has felt, 0.9 if not given; "
         "0: the pressure is solved anew in every step [-]",
+    )
+    density_relaxation: float | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="share of the error of the number density that a step of isph or explicit_isph takes off beside "
+        "the divergence; 0 if not given; 1: the density constraint of Shao and Lo 2003 [-]",
     )
     mach_number: float | None = Field(
         default=None,
@@ -184,15 +226,15 @@ class Method(Parameters):
     algorithm: Literal["midpoint", 1, 2, "original"] = Field(
         default="midpoint",
         description="derivatives in the middle of the step, of second order in time; the paper's at updated (1) or "
-        "initial positions (2); or 1 with a search in every iteration",
+        "initial positions (2); or 1 with a search in every iteration; isph updates them by the old velocity",
     )
     max_iterations: int = Field(default=2, ge=1, le=1000, description="cap of the inner iterations of a step [-]")
     projection_sweeps: int = Field(
         default=4,
         ge=0,
         le=1000,
-        description="projection sweeps after the iterations of a step, 0 in the paper; 1 if not given with isph, "
-        "0 with explicit_isph [-]",
+        description="projection sweeps after the iterations of a step, 0 in the paper; 1 if not given with isph "
+        "and explicit_isph [-]",
     )
     sweep_weights: Literal["chebyshev", "equal"] | None = Field(
         default=None,
@@ -262,13 +304,13 @@ class Method(Parameters):
     @model_validator(mode="before")
     @classmethod
     def _what_follows_from_others(cls, values: dict[str, Any]) -> dict[str, Any]:
-        if values.get("shift_coefficient") is None:
-            strain = 0.25 if values.get("dimensions", cls.in_space) == 3 else 0.75  # in 3-D more neighbours push
-            kind = values.get("shifting")
-            values = values | {"shift_coefficient": strain if kind in (None, "strain") else 0.04}
+        values = {name: value for name, value in values.items() if value is not None or name not in _FOLLOWING}
         for name, value in _goes_with(values.get("scheme")).items():
             if values.get(name, value) is None or (name not in values and value != cls.model_fields[name].default):
                 values = values | {name: value}
+        if values.get("shift_coefficient") is None:
+            coefficient = _shift_coefficient(values.get("shifting"), values.get("dimensions", cls.in_space))
+            values = values | {"shift_coefficient": coefficient}
         if values.get("courant") is not None:
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")
@@ -288,8 +330,10 @@ class Method(Parameters):
         for name, schemes in OWN.items():
             if values.get(name) is not None and scheme not in schemes:
                 raise ValueError(f"{name}: of the scheme {' or '.join(schemes)}, not of {scheme}; leave it out")
-        if scheme != "alsph" and values.get("algorithm") not in (None, "midpoint"):
-            raise ValueError(f"algorithm = {values['algorithm']!r}: of the scheme alsph, not of {scheme}; leave it out")
+        if scheme not in OWNERS["algorithm"] and values.get("algorithm") not in (None, "midpoint"):
+            raise ValueError(f"algorithm = {values['algorithm']!r}: not of the scheme {scheme}; leave it out")
+        if scheme != "alsph" and values.get("algorithm") == "original":
+            raise ValueError(f"algorithm = 'original': of the scheme alsph, not of {scheme}; leave it out")
         return values
 
     def replace(self, **changes: Any) -> Self:
@@ -301,18 +345,26 @@ class Method(Parameters):
         """Whether the fluid has a speed of sound, whatever the step."""
         return self.scheme in DIFFUSION
 
+    @property
+    def is_projection(self) -> bool:
+        """Whether a Poisson equation is solved for the pressure."""
+        return self.scheme in _ISPH
+
     def _scheme_settings(self) -> dict[str, Any]:
         """Return the engine's settings of the scheme alone."""
-        if self.scheme == "isph":
+        relaxation = {"density_relaxation": self.density_relaxation or 0.0}
+        if self.is_projection:
             return {
                 "kind": "isph",
                 "pressure_share": 0.9 if self.pressure_share is None else self.pressure_share,
                 "solver": self.solver or "bicgstab",
                 "tolerance": self.residual_tolerance,
                 "max_solver_iterations": self.most_iterations,
+                **relaxation,
             }
         if self.scheme == "explicit_isph":
-            return {"kind": self.scheme, "sweeps": self.most_iterations, "mach_number": self.mach_number or 0.1}
+            sweeps = {"sweeps": self.most_iterations, "mach_number": self.mach_number or 0.1}
+            return {"kind": self.scheme, **sweeps, **relaxation}
         if not self.is_weakly_compressible:
             return {"kind": "alsph"}
         given = self.diffusion_coefficient
@@ -328,14 +380,14 @@ class Method(Parameters):
     @property
     def residual_tolerance(self) -> float:
         """Relative residual that the Poisson solve of a step is to reach; 0 where there is none to reach."""
-        if self.scheme != "isph":
+        if not self.is_projection:
             return 0.0
         return 1e-3 if self.solver_tolerance is None else self.solver_tolerance
 
     @property
     def most_iterations(self) -> int:
         """Cap of the iterations of a step, those of the solver where there is one."""
-        if self.scheme == "isph":
+        if self.is_projection:
             return self.solver_iterations or 200
         return self.solver_iterations or 1 if self.scheme == "explicit_isph" else self.max_iterations
 
@@ -344,7 +396,7 @@ class Method(Parameters):
         """About how often a step goes over all pairs of particles."""
         if self.is_weakly_compressible:
             return 7
-        if self.scheme in ("isph", "explicit_isph"):
+        if self.is_projection or self.scheme == "explicit_isph":
             iteration = {"multigrid": 4, "bicgstab": 8}.get(self._scheme_settings().get("solver", ""), 1)
             return 9 + iteration * min(self.most_iterations, 4) + 2 * self.projection_sweeps
         iteration = 8 if self.algorithm in (1, "original") else 4
@@ -363,6 +415,7 @@ class Method(Parameters):
     def method_settings(self) -> dict[str, Any]:
         """Return those of the engine's settings that do not depend on the problem."""
         follows = self.courant is not None or self.is_weakly_compressible
+        updated = "updated" if self.scheme in (None, "alsph") else "predicted"
         shared = (
             "smoothing_ratio kernel courant adaptive_time_step adaptive_until time_step_safety max_iterations "
             "projection_sweeps penalty_constant velocity_laplacian laplacian_correction viscous_order shifting "
@@ -373,7 +426,7 @@ class Method(Parameters):
             "viscous_theta": self.viscous_theta or (0.5 if follows else 1.0),
             "sweep_weights": self.sweep_weights or ("chebyshev" if follows else "equal"),
             "sweep_pressure": self.sweep_pressure or ("smooth" if follows else "rough"),
-            "derivative_frame": {2: "initial", "midpoint": "midpoint"}.get(self.algorithm, "updated"),
+            "derivative_frame": {2: "initial", "midpoint": "midpoint"}.get(self.algorithm, updated),
             "search_every_iteration": self.algorithm == "original",
             "divergence_tolerance": self.tolerance,
         }

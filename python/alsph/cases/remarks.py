@@ -137,7 +137,7 @@ def scheme(name: str | None, wall_pressure: str) -> list[str]:
     compared = (
         f"other scheme: {name} has been compared with references in few flows, see docs/results.md, Other schemes"
     )
-    if wall_pressure != "linear" or name in ("isph", "explicit_isph"):
+    if wall_pressure != "linear" or name not in ("wcsph", "edac"):
         return [compared]
     grows = "growing sound: with wall_pressure = linear sound grew at solid walls until a fluid at rest broke down"
     return [compared, f"{grows}; use wall_pressure = adami"]

@@ -240,7 +240,7 @@ def compare_schemes(
     case
         The case, with or without settings of its runs, or the tables of its file. Its scheme does not count.
     schemes
-        Two or more of ``alsph``, ``isph``, ``explicit_isph``, ``wcsph`` and ``edac``.
+        Two or more of ``alsph``, ``isph``, ``explicit_isph``, ``wcsph``, ``edac``, ``shadloo`` and ``sisph``.
     resolutions
         D/Δx; that of the case if none are given. Two or more draw errors as curves over the cost.
     output
