@@ -28,6 +28,8 @@ mod k_operators;
 mod l_neighbours;
 #[path = "poisson.rs"]
 mod l_poisson;
+#[path = "first_instants.rs"]
+mod m_first_instants;
 #[path = "forcing.rs"]
 mod m_forcing;
 #[path = "custom_scheme.rs"]

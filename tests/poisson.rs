@@ -3,65 +3,20 @@
 
 use alsph::boundary::add_wall_flux;
 use alsph::discretisation::Divergence;
-use alsph::poisson::{Goal, Poisson, Solution, System};
 use alsph::settings::{Boundary, Settings, Solver};
-use alsph::{ParticleKind, Particles, Vector};
+use alsph::{ParticleKind, Vector};
 use common::set::Set;
+use common::solve::{add_outlet, noise_of, settings, solve, wave_of};
 use std::f64::consts::TAU;
 
 mod common;
-
-/// Settings of a unit box of `side` particles a direction, whose solids have the pressure of the fluid around.
-fn settings<const D: usize>(side: usize, boundary: &str) -> Settings {
-    let mut value = common::settings_value::<D>(1.0 / side as f64, boundary);
-    value["wall_pressure"] = "adami".into();
-    common::parse(&value)
-}
-
-/// x of −∇²x = `source`, by real particle.
-fn solve<const D: usize>(
-    set: &Set<D>,
-    settings: &Settings,
-    solver: Solver,
-    source: &[f64],
-    tolerance: f64,
-) -> (Solution, Vec<f64>) {
-    let Set { particles, frame } = set;
-    let system = System { settings, particles, frame, largest: settings.largest_eigenvalues() };
-    let mut poisson = Poisson::default();
-    poisson.begin(settings, particles, frame, solver);
-    let (mut source, mut x) = (source.to_vec(), vec![0.0; particles.len()]);
-    let solution =
-        poisson.solve(system, solver, Goal { tolerance, max_iterations: 1000, damping: 0.5 }, &mut source, &mut x);
-    x.truncate(particles.real);
-    (solution, x)
-}
-
-/// The same for everyone, of the particle with this id.
-fn noise(id: u64) -> f64 {
-    let mixed = (id + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let mixed = (mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    (mixed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-}
-
-fn noise_of<const D: usize>(particles: &Particles<D>) -> Vec<f64> {
-    particles.id[..particles.real].iter().map(|&id| noise(id)).collect()
-}
-
-/// A long wave, which only the background grid sees.
-fn wave_of<const D: usize>(particles: &Particles<D>) -> Vec<f64> {
-    particles.position[..particles.real].iter().map(|x| (0.5 * TAU * x[0]).cos()).collect()
-}
 
 /// A box of fluid, or of fluid around a cylinder; the last sixth of it an outlet if it has one.
 fn boxes(side: usize) -> Vec<(String, Settings, Set<2>)> {
     let settings = |boundary| settings::<2>(side, boundary);
     let whole = || common::particles(common::lattice::<2>(side, 0.2));
     let mut outlet = whole();
-    let last = |particles: &Particles<2>, i: usize| particles.position[i][0] > 5.0 / 6.0;
-    (0..outlet.real).filter(|&i| last(&outlet, i)).collect::<Vec<_>>().into_iter().for_each(|i| {
-        outlet.kind[i] = ParticleKind::Outlet;
-    });
+    add_outlet(&mut outlet, 5.0 / 6.0);
     let all = [
         ("periodic", "periodic", whole()),
         ("slip", "slip", whole()),

@@ -9,6 +9,7 @@ use std::f64::consts::{PI, TAU};
 
 pub mod manufactured;
 pub mod set;
+pub mod solve;
 
 /// Settings of a unit box with the same boundary on every side, no bodies but one still one named "wall".
 pub fn settings_value<const D: usize>(particle_spacing: f64, boundary: &str) -> Value {
@@ -94,8 +95,13 @@ pub fn distance(x: &Vector<2>) -> f64 {
 
 /// The lattice of the unit square cut by a cylinder in its middle, of solid particles on rings as `alsph.geometry` places them.
 pub fn cylinder(side: usize, layers: usize) -> Particles<2> {
+    perturbed_cylinder(side, layers, 0.0)
+}
+
+/// [`cylinder`] in a lattice displaced by up to `disorder` spacings; solids know where the surface is.
+pub fn perturbed_cylinder(side: usize, layers: usize, disorder: f64) -> Particles<2> {
     let spacing = 1.0 / side as f64;
-    let mut points = lattice(side, 0.0);
+    let mut points = lattice(side, disorder);
     points.retain(|x| distance(x) >= 0.0);
     let fluid = points.len();
     for radius in (0..layers).map(|layer| RADIUS - (layer as f64 + 0.5) * spacing).take_while(|&radius| radius > 0.0) {
