@@ -55,8 +55,9 @@ fn table<const D: usize>(name: &str, (particles, settings): (Particles<D>, Setti
                 let taken = seconds().zip(start).map_or(f64::NAN, |(end, start)| end - start);
                 let passes = passes * solution.iterations;
                 let each = 1e9 * taken / (passes as f64 * count as f64);
+                let ended = if solution.within_tolerance { "" } else { ", given up" };
                 println!(
-                    "| {name} | {count} | {kind} | {solver:?} | {tolerance:.0e} | {} | {passes} | {:.1e} | {taken:.2} | {each:.0} |",
+                    "| {name} | {count} | {kind} | {solver:?} | {tolerance:.0e} | {} | {passes} | {:.1e}{ended} | {taken:.2} | {each:.0} |",
                     solution.iterations, solution.residual,
                 );
             }

@@ -199,11 +199,24 @@ fn fall(length: f64, rows: usize, solid: bool) -> [f64; 3] {
 #[test]
 fn a_stream_flows_past_cylinders_as_a_potential_at_once() {
     let errors = [20, 40, 80].map(|side| start(side, 0.1).map(|share| (share - 1.0).abs()));
-    // The velocity at the shoulders is within 3 %; the impulse is not.
-    for (errors, most) in errors.iter().zip([[0.23, 0.055], [0.11, 0.03], [0.085, 0.022]]) {
-        assert!(errors[0] < most[0] && errors[2] < most[1], "{errors:?}");
+    // At D/Δx = 20 pressure and velocity at the surface are within 3 %; the sum that loads are is within 9 %, and falls slowly.
+    for (errors, most) in errors.iter().zip([[0.23, 0.09, 0.055], [0.1, 0.035, 0.03], [0.085, 0.02, 0.022]]) {
+        assert!(errors.iter().zip(most).all(|(error, most)| *error < most), "{errors:?}");
     }
     assert!(errors[0][0] > 1.9 * errors[1][0] && errors[1][0] > 1.1 * errors[2][0], "{errors:?}");
+}
+
+#[test]
+fn fluid_on_a_floor_rests() {
+    for rows in [20, 80] {
+        // Images answer all of the flux; solids 1.4 % too much of it on a lattice, whatever its spacing.
+        for (solid, most) in [(false, 0.001), (true, 0.018)] {
+            let [slope, floor] = rest(rows, solid).map(|share| share - 1.0);
+            assert!(slope.abs() < most, "{rows} {solid}: {slope}");
+            // The row of p = 0, beyond which there is nothing, takes the pressure of 0.3 Δx.
+            assert!(solid || (-0.35..-0.2).contains(&(rows as f64 * floor)), "{rows}: {floor}");
+        }
+    }
 }
 
 #[test]
@@ -227,19 +240,4 @@ fn a_column_that_is_let_go_has_the_exact_pressure_at_its_walls() {
             }
         }
     }
-}
-
-pub fn measured() {
-    for solid in [false, true] {
-        for rows in [20, 40, 80, 160] {
-            println!("rest solid {solid} {rows} {:?}", rest(rows, solid));
-        }
-    }
-    for disorder in [0.0, 0.1, 0.2] {
-        for side in [20, 40, 80, 160] {
-            println!("array {disorder} {} {:?}", side / 2, start(side, disorder));
-        }
-    }
-    println!("exact {} {}", Array::new().impulse(), Array::new().along(0.25, 0.5 * PI));
-    println!("{:?}", [(1.0, false), (1.0, true), (2.0, false), (2.0, true)].map(|(l, s)| fall(l, 20, s)));
 }
