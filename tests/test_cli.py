@@ -82,7 +82,7 @@ def test_what_is_not_used_is_not_loaded(program, loaded):
     [
         ("alsph ru", ["run", "runs"]),
         ("alsph run cyl", ["cylinder", "cylinder_pair"]),
-        ("alsph run cylinder --scheme ", ["alsph", "isph", "explicit_isph", "wcsph", "edac"]),
+        ("alsph run cylinder --scheme ", ["alsph", "isph", "explicit_isph", "wcsph", "edac", "shadloo", "sisph"]),
         ("alsph run cylinder --algorithm m", ["midpoint"]),
         ("alsph plot runs/a --field v", ["vorticity", "velocity", "velocity_divergence"]),
         ("alsph plot runs/a --format p", ["png", "pdf"]),
