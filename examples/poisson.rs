@@ -65,6 +65,9 @@ fn table<const D: usize>(name: &str, (particles, settings): (Particles<D>, Setti
     }
 }
 
+/// Particles and settings of so many rows.
+type Planar = fn(usize) -> (Particles<2>, Settings);
+
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let only = arguments.iter().find(|argument| argument.parse::<f64>().is_err());
@@ -78,8 +81,7 @@ fn main() {
         "| set | N | source | solver | tolerance | iterations | passes, at most | residual | s | ns/(particle and pass) |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
-    let planar: [(&str, fn(usize) -> (Particles<2>, Settings)); 3] =
-        [("cylinder", cylinder), ("array", array), ("box", closed::<2>)];
+    let planar: [(&str, Planar); 3] = [("cylinder", cylinder), ("array", array), ("box", closed::<2>)];
     let all = || {
         for (side, count) in [(160, 2e4), (500, 2e5), (1580, 2e6)] {
             for (name, make) in planar.into_iter().filter(|(name, _)| wanted(name, count)) {

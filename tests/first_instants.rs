@@ -111,7 +111,7 @@ fn column_pressure(length: f64, x: f64, y: f64) -> f64 {
     let term = |n: usize| {
         let k = (n as f64 + 0.5) * PI / length;
         let depth = (-k * y).exp() * (1.0 - (-2.0 * k * (1.0 - y)).exp()) / (1.0 + (-2.0 * k).exp());
-        (if n % 2 == 0 { 2.0 } else { -2.0 }) / (k * k * length) * (k * x).cos() * depth
+        (if n.is_multiple_of(2) { 2.0 } else { -2.0 }) / (k * k * length) * (k * x).cos() * depth
     };
     (0..4000).map(term).sum()
 }
