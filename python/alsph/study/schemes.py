@@ -110,7 +110,7 @@ class SchemeComparison:
     ----------
     results : Results
         The study of the schemes.
-    rows : list of Row
+    rows : list of alsph.study.schemes.Row
         One for each resolution and scheme.
     """
 
