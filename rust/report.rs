@@ -103,7 +103,7 @@ impl<const D: usize> Report<D> {
     /// The report of a step whose iteration has ended and whose particles have not yet been shifted; clock, counts, outcome and dissipation
     /// come after.
     pub fn new(step: Step, particles: &Particles<D>, volume: &[f64], penalty: f64, loads: Vec<Load<D>>) -> Self {
-        let undisturbed = step.settings.lattice_volume() * step.settings.particle_spacing.powi(D as i32);
+        let undisturbed = step.settings.undisturbed_volume();
         let [total, square, uneven] = exact_sums(particles.real, |i| {
             let fluid = particles.kind[i] == ParticleKind::Fluid;
             let uneven = || undisturbed / volume[i] - 1.0;

@@ -70,11 +70,11 @@ def test_solves_that_came_no_further_and_steps_of_an_older_alsph(tmp_path):
     steps = len(run.history["time"])
     run.history["residual"][:] = [np.nan, 0.03, 5e-3, *[1e-4] * (steps - 3)]
     run.history["converged"][:3] = 0
-    (remark,) = unsolved(run, run.config.case)
+    (remark,) = unsolved(run, tolerance=1e-3, cap=200)
     assert f"in 2 of {steps - 1} steps" in remark and "0 at the cap of 200 iterations" in remark
     assert remark.endswith("residual up to 0.03; it fell no further; use another solver")
     run.history["residual"][:] = np.nan
-    assert unsolved(run, run.config.case) == []
+    assert unsolved(run, tolerance=1e-3, cap=200) == []
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import shutil
 
 import alsph as package
 import pytest
-from alsph.cases import Cylinder, TaylorGreen
+from alsph.cases import Cylinder, Sphere, TaylorGreen
 from alsph.cases.method import SCHEMES
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError
@@ -29,6 +29,8 @@ def configs(case, schemes=SCHEMES, resolutions=(), **parameters):
 def test_each_scheme_gets_its_own_defaults_whatever_the_case_had(before):
     for scheme, case in configs(Cylinder(scheme=before)).items():
         assert case == Cylinder(scheme=scheme)
+    for scheme, case in configs(Sphere(scheme=before)).items():
+        assert case == Sphere(scheme=scheme)
 
 
 def test_what_a_case_says_of_its_own_scheme_stays_with_it():

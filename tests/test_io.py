@@ -10,7 +10,8 @@ from alsph import config
 from alsph.config import Config, RunSettings
 from alsph.errors import RunFolderError
 from alsph.folder import vtkhdf
-from alsph.folder.run_folder import RunFolder, flatten
+from alsph.folder.history import flatten
+from alsph.folder.run_folder import RunFolder
 from alsph.geometry.surface import circle
 from alsph.running.outputs import SurfacePressure
 from synthetic import append_surface

@@ -96,7 +96,7 @@ impl<const D: usize> Isph<D> {
             goal,
             relaxed,
             density_relaxation,
-            undisturbed: settings.lattice_volume() * settings.particle_spacing.powi(D as i32),
+            undisturbed: settings.undisturbed_volume(),
             largest,
             sweeps: Sweeps::new(settings, largest),
             viscous: Viscous::new(settings),

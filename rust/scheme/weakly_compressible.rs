@@ -8,7 +8,7 @@
 //!
 //! κ = δ h c₀ is the density diffusion of δ-SPH, of ∇²p (Molteni and Colagrossi 2009) or of what ∇²p has beyond ∇·∇p, nothing where p is
 //! smooth (after Antuono et al. 2010); κ = α h c₀/8 that of entropically damped artificial compressibility (EDAC; Ramachandran and Puri
-//! 2019). A step is one of Störmer and Verlet in its frame: half of p, all of u, the other half of p. The viscous term is that of u^n.
+//! 2019). A step is one of Störmer and Verlet in its frame: half of p, all of u, the other half of p. The viscous term is [`Viscous`].
 
 use crate::base::{Matrix, Vector, parallel};
 use crate::boundary::{PressureRule, VelocityRule, conditions, extend_pressure, extrapolate_vector};

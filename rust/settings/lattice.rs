@@ -53,7 +53,12 @@ impl Settings {
         slopes.iter().map(|(r, slope)| -factor * slope * r[0].powi(4) / 24.0).sum()
     }
 
-    /// V = 1 / Σ W of a particle on a square lattice, over Δx^D: nearly 1.
+    /// V = 1 / Σ W of a particle of the undisturbed lattice, nearly Δx^D.
+    pub fn undisturbed_volume(&self) -> f64 {
+        self.lattice_volume() * self.particle_spacing.powi(self.dimensions as i32)
+    }
+
+    /// The same over Δx^D.
     pub fn lattice_volume(&self) -> f64 {
         1.0 / self.lattice_kernels().iter().map(|w| w.2).sum::<f64>()
     }

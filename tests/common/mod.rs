@@ -98,7 +98,7 @@ pub fn cylinder(side: usize, layers: usize) -> Particles<2> {
     perturbed_cylinder(side, layers, 0.0)
 }
 
-/// [`cylinder`] in a lattice displaced by up to `disorder` spacings; solids know where the surface is.
+/// [`cylinder`] in a lattice displaced by up to `disorder` spacings.
 pub fn perturbed_cylinder(side: usize, layers: usize, disorder: f64) -> Particles<2> {
     let spacing = 1.0 / side as f64;
     let mut points = lattice(side, disorder);

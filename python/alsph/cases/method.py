@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -31,7 +31,9 @@ PAPER = {"time_step": 0.0508, "penalty_constant": 100.0}
 """ΔtU/Δx and C_BV where only one of them is given."""
 
 
-SCHEMES = ("alsph", "isph", "explicit_isph", "wcsph", "edac", "shadloo", "sisph")
+Scheme = Literal["alsph", "isph", "explicit_isph", "wcsph", "edac", "shadloo", "sisph"]
+
+SCHEMES: tuple[str, ...] = get_args(Scheme)
 
 _ANEW = {"algorithm": 2, "pressure_share": 0.0, "projection_sweeps": 1, "viscous_order": 2}
 
@@ -44,14 +46,13 @@ PRESETS: dict[str, dict[str, Any]] = {
 
 _ISPH = ("isph", *PRESETS)
 
+_FOLLOWING = {"wall_pressure", "projection_sweeps", "algorithm", "viscous_order", "shifting"}
+"""Parameters with a value of their own that a scheme may have for another."""
+
 
 def _as_in_the_paper(values: Mapping[str, Any]) -> bool:
     """Whether values ask for the paper's time step and penalty: by one of them, or by an algorithm of first order."""
     return any(values.get(name) is not None for name in PAPER) or values.get("algorithm") not in (None, "midpoint")
-
-
-_FOLLOWING = {"wall_pressure", "projection_sweeps", "shifting", *_ANEW} - {"pressure_share"}
-"""Parameters with a value of their own that a scheme may have for another."""
 
 
 def _goes_with(scheme: Any) -> dict[str, Any]:
@@ -63,32 +64,30 @@ def _goes_with(scheme: Any) -> dict[str, Any]:
     }
 
 
-def _defaults(scheme: Any, dimensions: int) -> dict[str, Any]:
+def _defaults(scheme: Any) -> dict[str, Any]:
     """Return the values that a scheme has of all parameters which depend on the scheme, where nothing else is given."""
-    own = _goes_with(scheme)
-    found = {name: Method.model_fields[name].default for name in _FOLLOWING} | own
-    return found | {"shift_coefficient": _shift_coefficient(found["shifting"], dimensions)}
+    return {name: Method.model_fields[name].default for name in _FOLLOWING} | _goes_with(scheme)
 
 
-def _shift_coefficient(shifting: Any, dimensions: Any) -> float:
-    strain = 0.25 if dimensions == 3 else 0.75  # in 3-D more neighbours push
-    return strain if shifting in (None, "strain") else 0.04
+def _coefficient_of(*schemes: Any) -> tuple[str, ...]:
+    """Name the coefficient of the shifting, which goes with its kind, if a scheme of these has a kind of its own."""
+    return ("shift_coefficient",) if any("shifting" in _goes_with(scheme) for scheme in schemes) else ()
 
 
 def superseded(changes: Mapping[str, Any], before: Mapping[str, Any]) -> tuple[str, ...]:
     """Names of the parameters whose place others take, of a case that had those of `before`.
 
-    A Courant number takes that of the paper's pair, which takes its; the coefficient of a shifting goes with its kind,
-    the rule of the walls' pressure and the number of sweeps with the scheme, if they were the scheme's. From units the
-    Reynolds number follows.
+    A Courant number takes that of the paper's pair, which takes its; the coefficient of a shifting goes with its kind.
+    With the scheme goes what was the scheme's: of a preset all that it sets, of others the rule of the walls' pressure
+    and the number of sweeps. From units the Reynolds number follows.
     """
     others: tuple[str, ...] = ()
     if any(changes.get(name) is not None for name in ("shifting", "dimensions")):
         others += ("shift_coefficient",)
     schemes = [table.get("scheme") or "alsph" for table in (before, {**before, **changes})]
     if schemes[0] != schemes[1]:
-        defaults = _defaults(schemes[0], before.get("dimensions") or 2)
-        others += tuple(name for name, value in defaults.items() if before.get(name) == value)
+        others += tuple(name for name, value in _defaults(schemes[0]).items() if before.get(name) == value)
+        others += _coefficient_of(*schemes)
     if changes.get("units") is not None:
         others += ("reynolds",)
     if changes.get("courant") is not None:
@@ -119,10 +118,12 @@ DIFFUSION = {"wcsph": 0.1, "edac": 0.5}
 
 def of_all_schemes(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return those of a case's parameters that hold whatever its scheme: not its own, nor what follows from it."""
-    follows = _defaults(values.get("scheme"), values.get("dimensions") or 2) | {"courant": COURANT}
+    scheme = values.get("scheme")
+    follows = _defaults(scheme) | {"courant": COURANT}
     if values.get("penalty_constant") is not None:
         follows["time_step"] = PAPER["time_step"]
     left_out = {"scheme", *OWNERS, *(name for name, value in follows.items() if values.get(name) == value)}
+    left_out.update(_coefficient_of(scheme))
     return {name: value for name, value in values.items() if name not in left_out}
 
 
@@ -140,7 +141,7 @@ class Method(Parameters):
     in_space: ClassVar[int] = 2
     """Number of space dimensions of a case without a parameter for it."""
 
-    scheme: Literal["alsph", "isph", "explicit_isph", "wcsph", "edac", "shadloo", "sisph"] | None = Field(
+    scheme: Scheme | None = Field(
         default=None,
         description="augmented Lagrangian SPH, projection ISPH, explicit ISPH, weakly compressible SPH, entropically "
         "damped artificial compressibility, or isph set as Shadloo et al. 2011 or Muta et al. 2020 (sisph) have it; "
@@ -309,8 +310,9 @@ class Method(Parameters):
             if values.get(name, value) is None or (name not in values and value != cls.model_fields[name].default):
                 values = values | {name: value}
         if values.get("shift_coefficient") is None:
-            coefficient = _shift_coefficient(values.get("shifting"), values.get("dimensions", cls.in_space))
-            values = values | {"shift_coefficient": coefficient}
+            strain = 0.25 if values.get("dimensions", cls.in_space) == 3 else 0.75  # in 3-D more neighbours push
+            kind = values.get("shifting")
+            values = values | {"shift_coefficient": strain if kind in (None, "strain") else 0.04}
         if values.get("courant") is not None:
             if values.get("penalty_constant") is not None:
                 raise ValueError("courant and penalty_constant: the penalty follows one of them; leave the other out")

@@ -4,7 +4,6 @@ Whatever cuts a run, it can be resumed: see :mod:`alsph.folder.durable`. One pro
 folder, which holds its lock; the files themselves are not locked, so that a viewer that has one open stops no run.
 """
 
-import csv
 import itertools
 import json
 import os
@@ -24,11 +23,11 @@ from typing import Any, Protocol
 import filelock
 from numpy.typing import NDArray
 
-from alsph.arrays import AXES, size_of
+from alsph.arrays import size_of
 from alsph.engine.output import Output
 from alsph.engine.prescribed import Prescription
 from alsph.errors import DamagedError, RunFolderError
-from alsph.folder import checkpoint, reading, vtkhdf
+from alsph.folder import checkpoint, history, reading, vtkhdf
 from alsph.folder.checkpoint import Checkpoint
 from alsph.folder.durable import flush, is_plain, replacing
 from alsph.folder.reading import DAMAGE
@@ -54,8 +53,6 @@ OWN = re.compile(
 """Names of the files that alsph makes in a run folder and its figures, and removes when the folder is replaced."""
 UNFINISHED = ("starting", "running", "interrupted")
 """What ``run.json`` says of a run that goes on or can go on."""
-UNKNOWN = "nan"
-"""What stands in the history for what an older alsph did not record."""
 SPARE_BYTES = 2 * 2**20
 """Room that must stay free on the disk beside what is written next."""
 PATIENCE_SECONDS = 2.0
@@ -221,20 +218,16 @@ class RunFolder:
 
         That of an older alsph is given the columns that it lacks first.
         """
-        columns = flatten(rows, bodies)
+        columns = history.flatten(rows, bodies)
         path = self._file("history.csv")
         with self._writing():
-            known = _columns_of(path)
+            known = history.names(path)
         missing = [name for name in columns if name not in known]
         self._make_room(2 * size_of(columns) + (2 * path.stat().st_size if known and missing else 0))
         with self._writing():
             if known and missing:
-                _widen(path, missing)
-            with path.open("a", newline="", encoding="utf-8") as file:
-                writer = csv.DictWriter(file, [*known, *missing], restval=UNKNOWN, lineterminator="\n")
-                if file.tell() == 0:
-                    writer.writeheader()
-                writer.writerows(dict(zip(columns, line, strict=True)) for line in history_lines(rows, bodies))
+                history.widen(path, missing)
+            history.append(path, columns, [*known, *missing])
 
     def append_particles(self, time: float, particles: dict[str, NDArray[Any]]) -> None:
         """Append an output to ``particles.vtkhdf``."""
@@ -344,7 +337,7 @@ class RunFolder:
         damaged = []
         with self._writing():
             parts: dict[str, Callable[[Path], None]] = {
-                "history.csv": lambda path: _truncate_history(path, step),
+                "history.csv": lambda path: history.truncate(path, step),
                 "particles.vtkhdf": lambda path: vtkhdf.truncate(path, time),
             }
             outputs = list(outputs)
@@ -408,56 +401,3 @@ def _unless_damaged(path: Path, change: Callable[[Path], None]) -> str:
         path.replace(aside)
         return f"{path.name} is damaged ({error}) and set aside as {aside.name}"
     return ""
-
-
-def _truncate_history(path: Path, last: int) -> None:
-    """Keep the complete rows up to a step."""
-    with path.open("rb") as file, replacing(path) as new_path:
-        header = next(file, b"")
-        if header and not (header.startswith(b"step,") and header.endswith(b"\n")):
-            raise ValueError("its first line does not name its columns")
-        with new_path.open("wb") as new:
-            new.write(header)
-            for row in file:
-                number = row.split(b",")[0] if row.count(b",") == header.count(b",") and row.endswith(b"\n") else b""
-                if number.isdigit() and int(number) <= last:
-                    new.write(row)
-
-
-def _columns_of(path: Path) -> list[str]:
-    """Return the names of the columns of a history, none if there is none, or it is damaged."""
-    if not path.exists():
-        return []
-    with path.open(encoding="utf-8", errors="replace") as file:
-        header = file.readline()
-    return header.rstrip("\n").split(",") if header.startswith("step,") and header.endswith("\n") else []
-
-
-def _widen(path: Path, columns: list[str]) -> None:
-    """Give a history further columns, unknown in all its rows."""
-    with path.open("rb") as file, replacing(path) as new_path, new_path.open("wb") as new:
-        new.write(b",".join([next(file).rstrip(b"\n"), *(name.encode() for name in columns)]) + b"\n")
-        new.writelines(row.rstrip(b"\n") + f",{UNKNOWN}".encode() * len(columns) + b"\n" for row in file)
-
-
-def flatten(rows: dict[str, NDArray[Any]], bodies: list[str]) -> dict[str, NDArray[Any]]:
-    """Return the history with vectors split into one column a component, ``BODY_pressure_force_x`` and so on."""
-    columns = {}
-    for name, values in rows.items():
-        if values.ndim == 1:
-            columns[name] = values
-            continue
-        for index, body in enumerate(bodies):
-            for component, axis in zip(values[:, index].T, AXES if values.shape[2] > 1 else ("",), strict=False):
-                columns[f"{body}_{name}_{axis}".rstrip("_")] = component
-    return columns
-
-
-def history_lines(rows: dict[str, NDArray[Any]], bodies: list[str]) -> list[list[str]]:
-    """Return the rows as they stand in ``history.csv``."""
-    columns = (map(_text, column.tolist()) for column in flatten(rows, bodies).values())
-    return [list(row) for row in zip(*columns, strict=True)]
-
-
-def _text(value: float) -> str:
-    return f"{value:.10g}" if isinstance(value, float) else str(int(value))

@@ -3,7 +3,6 @@
 import numpy as np
 
 from alsph.analysis.record import Record
-from alsph.cases.base import Case
 
 DIVERGENCE = 0.02
 """Mean |∇·u| [U/D] above which it is remarked upon; runs with the defaults have 1e-4 to 5e-3 (docs/results.md)."""
@@ -36,17 +35,17 @@ def outcome(run: Record, until: float) -> list[str]:
     return found
 
 
-def unsolved(run: Record, case: Case) -> list[str]:
+def unsolved(run: Record, tolerance: float, cap: int) -> list[str]:
     """Remark on steps whose Poisson solve ended above its tolerance, of those whose residual is known."""
     residual = run.history.get("residual", np.empty(0))
     looked = np.isfinite(residual)
-    if not looked.any() or not case.residual_tolerance:
+    if not looked.any() or not tolerance:
         return []
     failed = looked & (run.history["converged"] == 0)
     if not failed.any():
         return []
-    capped = int((failed & (run.history["iterations"] >= case.most_iterations)).sum())
+    capped = int((failed & (run.history["iterations"] >= cap)).sum())
     text = f"in {failed.sum()} of {looked.sum()} steps the Poisson solve ended above its tolerance of "
-    text += f"{case.residual_tolerance:g}, {capped} at the cap of {case.most_iterations} iterations, "
+    text += f"{tolerance:g}, {capped} at the cap of {cap} iterations, "
     remedy = "raise solver_iterations or use another solver" if capped else "it fell no further; use another solver"
     return [f"pressure not solved: {text}residual up to {residual[failed].max():.2g}; {remedy}"]

@@ -124,7 +124,8 @@ class Run(Loads):
         What resolution, method and domain cannot carry (:meth:`alsph.cases.Case.remarks`), and what came of the run.
         """
         case = self.config.case
-        return [*outcome(self, self.config.until), *unsolved(self, case), *self._judged[1], *case.remarks()]
+        solved = unsolved(self, case.residual_tolerance, case.most_iterations)
+        return [*outcome(self, self.config.until), *solved, *self._judged[1], *case.remarks()]
 
     @property
     def units(self) -> Units | None:

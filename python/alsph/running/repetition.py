@@ -11,7 +11,8 @@ from alsph.engine.prescribed import WORDS, difference
 from alsph.engine.simulation import SLICE_SECONDS, Simulation
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.folder import checkpoint
-from alsph.folder.run_folder import START, UNKNOWN, RunFolder, flatten, history_lines
+from alsph.folder.history import UNKNOWN, flatten, lines
+from alsph.folder.run_folder import START, RunFolder
 from alsph.running import beginning
 from alsph.running.progress import Reporter
 from alsph.running.provenance import provenance
@@ -102,9 +103,7 @@ def repeat(path: str | Path, threads: int | None = None, *, progress: bool = Tru
                 simulation.advance(end - simulation.step, SLICE_SECONDS)
                 rows = simulation.new_history(keep=False)
                 reporter.update(rows)
-                columns = list(flatten(rows, bodies))
-                for line in history_lines(rows, bodies):
-                    now = dict(zip(columns, line, strict=True))
+                for now in lines(flatten(rows, bodies)):
                     unequal = unequal or _difference(names, next(file, ""), now)
     return Repetition(
         steps=simulation.step,

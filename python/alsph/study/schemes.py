@@ -293,8 +293,11 @@ def _declared(
             raise ConfigError(f"{name}: of the scheme {' or '.join(OWNERS[name])}, which is not compared; leave it out")
     base = overridden(of_all_schemes(tables), {name: parameters[name] for name in parameters if name not in OWNERS})
     own = {scheme: of_scheme(scheme, tables | parameters) for scheme in chosen}
-    gone = {scheme: [name for name in superseded(own[scheme], base) if name in base] for scheme in chosen}
-    sets = [{"scheme": scheme} | dict.fromkeys(gone[scheme]) | own[scheme] for scheme in chosen]
+    sets = []
+    for scheme in chosen:
+        of_others = {*superseded({"scheme": scheme}, base)} - {*parameters}  # what was asked for stays
+        gone = [name for name in base if name in of_others or name in superseded(own[scheme], base)]
+        sets.append({"scheme": scheme} | dict.fromkeys(gone) | own[scheme])
     ladder = {"resolution": sorted(set(resolutions))} if resolutions else {}
     sweep = Sweep(product=ladder, sets=sets)
     points = Study(name="compare", base=base, sweep=sweep).points()
