@@ -5,6 +5,7 @@
 //!
 //! All sums are exact, so that neither the number of threads nor the order of the particles changes a bit.
 
+mod level;
 mod multigrid;
 mod row;
 
