@@ -118,6 +118,19 @@ fn the_solution_is_that_of_the_equation() {
     assert!(errors[2] < 0.006, "{errors:?}");
 }
 
+/// What solids show, too, which a gradient near walls reads.
+#[test]
+fn solvers_agree_at_every_particle() {
+    for (name, settings, set) in boxes(48) {
+        let source = wave_of(&set.particles);
+        let [(_, one), (solution, other)] =
+            [Solver::Bicgstab, Solver::Multigrid].map(|solver| solve(&set, &settings, solver, &source, 1e-10));
+        let largest = one.iter().map(|x| x.abs()).fold(0.0, f64::max);
+        let apart = one.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 1e-7 * largest, "{name}: {apart} of {largest}, {solution:?}");
+    }
+}
+
 #[test]
 fn neither_threads_nor_the_order_change_a_bit() {
     for (name, settings, set) in boxes(32) {

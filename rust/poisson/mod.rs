@@ -100,7 +100,7 @@ impl<const D: usize> Poisson<D> {
         }
     }
 
-    /// Solve −∇²x = `source`, beginning with `x`, real particles and images. `x` of solids and images is left as the Laplacian saw it.
+    /// Solve −∇²x = `source`, beginning with `x`, real particles and images. `x` of solids and images is left as the Laplacian sees it.
     pub fn solve(&mut self, system: System<D>, solver: Solver, goal: Goal, source: &mut [f64], x: &mut [f64]) -> Solution {
         let rows = &self.rows;
         parallel::for_each(source, |i, source| {
@@ -150,6 +150,8 @@ impl<const D: usize> Poisson<D> {
                 least = (solution.residual, solution.iterations);
             }
         }
+        let System { settings, particles, frame, .. } = system;
+        extrapolate_scalar(settings, frame, &particles.kind[..particles.real], x);
         solution
     }
 

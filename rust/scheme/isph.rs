@@ -29,7 +29,7 @@ const JACOBI_DAMPING: f64 = 0.5;
 const SEVERAL_DAMPING: f64 = 0.8;
 
 /// The share of u^n's flux into walls, the answer of the step before, that is not answered again. What that answer left is mostly the
-/// disorder of the particles, and with it the forces on bodies are three times as noisy.
+/// disorder of the particles, and with it the forces on bodies are three times as noisy. Where no pressure stands yet nothing was answered.
 const ANSWERED: f64 = 0.8;
 
 /// The fields of one step beside those of the particles, real particles and, where they have neighbours that read them, images.
@@ -171,9 +171,11 @@ impl<const D: usize> Isph<D> {
         frame.images.blank(&mut self.source, particles.real);
         let star = &self.velocity_star;
         frame.stencil.for_each_one(Divergence(star), &mut self.source, |_, divergence, out| *out = divergence);
-        let flux_of = |j: usize| star[j] - particles.velocity[j] * ANSWERED;
-        // A pressure that begins anew in every step has but this one to answer.
-        let corners = self.pressure_share == 0.0 && !self.is_explicit();
+        let starts = particles.pressure[..particles.real].iter().all(|&p| p == 0.0);
+        let answered = if starts { 0.0 } else { ANSWERED };
+        let flux_of = |j: usize| star[j] - particles.velocity[j] * answered;
+        // A pressure that begins anew has but this step to answer in.
+        let corners = starts || self.pressure_share == 0.0 && !self.is_explicit();
         add_wall_flux(step.settings, particles, frame, flux_of, corners, &mut self.handed, &mut self.source);
         let (condition, factor) = (conditions(step.settings), step.settings.density / step.time_step);
         parallel::for_each(&mut self.source, |i, source| {
