@@ -58,7 +58,7 @@ pub fn find<const D: usize>(
             if under > DEEP * settings.particle_spacing {
                 return symptom("position", under);
             }
-            if volume[i] > largest || frame.stencil.correction[i].is_singular() {
+            if settings.free_surface.is_none() && (volume[i] > largest || frame.stencil.correction[i].is_singular()) {
                 return symptom("volume", volume[i]);
             }
         }
@@ -96,7 +96,12 @@ fn depth<const D: usize>(settings: &Settings, particles: &Particles<D>, frame: &
 /// How far `position` lies beyond the sides of the domain that particles cannot cross.
 fn beyond_walls<const D: usize>(settings: &Settings, position: &Vector<D>) -> f64 {
     let domain = &settings.domain;
-    let closed = |side| !matches!(side, Boundary::Inlet | Boundary::Outlet);
+    let open_to_air = settings.free_surface.is_some();
+    let closed = |side| match side {
+        Boundary::Inlet | Boundary::Outlet => false,
+        Boundary::None => !open_to_air,
+        Boundary::Slip | Boundary::Periodic => true,
+    };
     (0..D).fold(0.0, |farthest: f64, axis| {
         let [lower, upper] = domain.boundaries[axis];
         let below = if closed(lower) { domain.lower[axis] - position[axis] } else { 0.0 };

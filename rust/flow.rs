@@ -7,6 +7,7 @@ use crate::forcing::BodyForce;
 use crate::frame::Frame;
 use crate::particles::Particles;
 use crate::settings::Settings;
+use crate::surface::Surface;
 
 /// What stays the same during a step.
 #[derive(Clone, Copy)]
@@ -26,6 +27,8 @@ pub struct Flow<const D: usize> {
     pub walls: Walls<D>,
     pub before: Before<D>,
     pub body_force: BodyForce<D>,
+    /// Of the frame; of no particles if the fluid fills the domain.
+    pub surface: Surface<D>,
 }
 
 /// r^n, u^n, p^n of the real particles.
@@ -38,8 +41,8 @@ pub struct Before<const D: usize> {
 
 impl<const D: usize> Flow<D> {
     pub fn new(settings: &Settings, particles: Particles<D>) -> Self {
-        let (frame, before) = (Frame::default(), Before::default());
-        Self { particles, frame, walls: Walls::new(settings), before, body_force: BodyForce::new(settings) }
+        let (frame, before, surface) = (Frame::default(), Before::default(), Surface::default());
+        Self { particles, frame, walls: Walls::new(settings), before, body_force: BodyForce::new(settings), surface }
     }
 
     /// Keep the state before a step, whose frame may stand in the middle of it.

@@ -26,6 +26,7 @@ pub mod scheme;
 pub mod settings;
 pub mod shifting;
 mod simulation;
+pub mod surface;
 
 pub use base::{Error, Matrix, Result, Vector};
 pub use particles::{ParticleKind, Particles};

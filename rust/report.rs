@@ -1,6 +1,7 @@
 //! Clock and report: what goes on through a restart, and what is recorded of a step.
 
 use crate::base::{Vector, exact_sums, parallel};
+use crate::discretisation::Stencil;
 use crate::flow::{Flow, Step};
 use crate::loads::Load;
 use crate::particles::{ParticleKind, Particles};
@@ -33,6 +34,8 @@ pub struct Report<const D: usize> {
     /// Σ V_i and ½ρ Σ V_i u_i² of the fluid.
     pub volume: f64,
     pub kinetic_energy: f64,
+    /// −ρ Σ V_i g·r_i of the fluid at the end of the step, g being the body force of the settings.
+    pub potential_energy: f64,
     pub packing: Packing,
     /// What viscosity takes of the kinetic energy in unit time, see [`dissipation`].
     pub dissipation: f64,
@@ -40,6 +43,8 @@ pub struct Report<const D: usize> {
     pub inlet_pressure: f64,
     /// Fluid, inlet, outlet, solid at the end of the step.
     pub counts: [usize; 4],
+    /// Particles at a free surface, and those that are alone.
+    pub places: [usize; 2],
     pub loads: Vec<Load<D>>,
 }
 
@@ -77,6 +82,7 @@ pub fn columns<const D: usize>() -> Vec<(&'static str, Column<D>)> {
         ("penalty_coefficient", Number(|r| r.penalty)),
         ("volume", Number(|r| r.volume)),
         ("kinetic_energy", Number(|r| r.kinetic_energy)),
+        ("potential_energy", Number(|r| r.potential_energy)),
         ("dissipation", Number(|r| r.dissipation)),
         ("packing_min", Number(|r| r.packing.min)),
         ("packing_max", Number(|r| r.packing.max)),
@@ -92,6 +98,8 @@ pub fn columns<const D: usize>() -> Vec<(&'static str, Column<D>)> {
         (ParticleKind::NAMES[1], Count(|r| r.counts[1] as u64)),
         (ParticleKind::NAMES[2], Count(|r| r.counts[2] as u64)),
         (ParticleKind::NAMES[3], Count(|r| r.counts[3] as u64)),
+        ("surface", Count(|r| r.places[0] as u64)),
+        ("isolated", Count(|r| r.places[1] as u64)),
         ("pressure_force", Force(|load| load.pressure_force)),
         ("viscous_force", Force(|load| load.viscous_force)),
         ("pressure_torque", Torque(|load| load.pressure_torque)),
@@ -102,14 +110,15 @@ pub fn columns<const D: usize>() -> Vec<(&'static str, Column<D>)> {
 impl<const D: usize> Report<D> {
     /// The report of a step whose iteration has ended and whose particles have not yet been shifted; clock, counts, outcome and dissipation
     /// come after.
-    pub fn new(step: Step, particles: &Particles<D>, volume: &[f64], penalty: f64, loads: Vec<Load<D>>) -> Self {
+    pub fn new(step: Step, particles: &Particles<D>, stencil: &Stencil<D>, penalty: f64, loads: Vec<Load<D>>) -> Self {
         let undisturbed = step.settings.undisturbed_volume();
+        let Stencil { volume, number_density, .. } = stencil;
         let [total, square, uneven] = exact_sums(particles.real, |i| {
             let fluid = particles.kind[i] == ParticleKind::Fluid;
-            let uneven = || undisturbed / volume[i] - 1.0;
+            let uneven = || undisturbed * number_density[i] - 1.0;
             fluid.then(|| [volume[i], volume[i] * particles.velocity[i].norm_squared(), uneven() * uneven()])
         });
-        let [least, largest] = extremes(particles, volume);
+        let [least, largest] = extremes(particles, number_density);
         let fluid = particles.counts()[ParticleKind::Fluid as usize];
         Self {
             clock: Clock::default(),
@@ -126,20 +135,22 @@ impl<const D: usize> Report<D> {
             fluid,
             volume: total,
             kinetic_energy: 0.5 * step.settings.density * square,
-            packing: Packing { min: undisturbed / largest, max: undisturbed / least, rms: (uneven / fluid as f64).sqrt() },
+            potential_energy: f64::NAN,
+            packing: Packing { min: undisturbed * least, max: undisturbed * largest, rms: (uneven / fluid as f64).sqrt() },
             dissipation: f64::NAN,
             inlet_pressure: inlet_pressure(step.settings, particles),
             counts: [0; 4],
+            places: [0; 2],
             loads,
         }
     }
 }
 
-/// The least and the largest volume of the fluid particles; of no fluid no numbers.
-fn extremes<const D: usize>(particles: &Particles<D>, volume: &[f64]) -> [f64; 2] {
+/// The least and the largest number density of the fluid particles; of no fluid no numbers.
+fn extremes<const D: usize>(particles: &Particles<D>, density: &[f64]) -> [f64; 2] {
     let wider = |[least, largest]: [f64; 2], [a, b]: [f64; 2]| [least.min(a), largest.max(b)];
     let fluid = |i: &usize| particles.kind[*i] == ParticleKind::Fluid;
-    let of = |range: Range<usize>| range.filter(fluid).fold([f64::NAN; 2], |known, i| wider(known, [volume[i]; 2]));
+    let of = |range: Range<usize>| range.filter(fluid).fold([f64::NAN; 2], |known, i| wider(known, [density[i]; 2]));
     parallel::reduce(particles.real, of, wider).unwrap_or([f64::NAN; 2])
 }
 
@@ -159,6 +170,15 @@ pub fn dissipation<const D: usize>(
     });
     let given: f64 = loads.iter().map(|load| load.sliding_power).sum();
     step.settings.density * step.settings.kinematic_viscosity * taken + given
+}
+
+/// [`Report::potential_energy`] once the particles have moved.
+pub fn potential_energy<const D: usize>(step: Step, Flow { particles, frame, .. }: &Flow<D>) -> f64 {
+    let gravity = Vector::<D>::from_column_slice(&step.settings.body_force);
+    let [sum] = exact_sums(particles.real, |i| {
+        (particles.kind[i] == ParticleKind::Fluid).then(|| [frame.stencil.volume[i] * gravity.dot(&particles.position[i])])
+    });
+    -step.settings.density * sum
 }
 
 fn inlet_pressure<const D: usize>(settings: &Settings, particles: &Particles<D>) -> f64 {

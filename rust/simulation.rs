@@ -14,7 +14,7 @@ use crate::interpolation::interpolate;
 use crate::loads::loads;
 use crate::neighbours::Grid;
 use crate::particles::{ParticleKind, Particles, is_late, lineage};
-use crate::report::{Clock, Report, dissipation};
+use crate::report::{Clock, Report, dissipation, potential_energy};
 use crate::scheme::{self, Outcome, Scheme};
 use crate::settings::{Boundary, Settings};
 use crate::shifting::{Change, measures_divergence, shift};
@@ -152,6 +152,9 @@ impl<const D: usize> Simulation<D> {
         self.prepare_step(Travel { time_step, velocity_max, fraction: self.settings.derivative_frame.fraction() });
         let step = Step { settings: &self.settings, time_step, velocity_max };
         let (flow, scheme) = (&mut self.flow, &mut self.scheme);
+        if step.settings.free_surface.is_some() {
+            flow.surface.find(step.settings, &flow.particles, &mut flow.frame);
+        }
         let Flow { particles, frame, body_force, .. } = &mut *flow;
         let middle = self.clock.time + 0.5 * time_step;
         let prescribed = self.forcing.apply(step.settings, particles, frame, body_force, middle);
@@ -172,9 +175,10 @@ impl<const D: usize> Simulation<D> {
         let acting = |i: usize| scheme.acting_pressure(step, &flow.particles, i);
         let loads = loads(step.settings, &flow.particles, &flow.frame, &flow.walls, acting);
         let dissipated = dissipation(step, flow, &loads, |i| scheme.viscous_laplacian(step, i));
-        let mut report = Report::new(step, &flow.particles, &flow.frame.stencil.volume, scheme.penalty(time_step), loads);
+        let mut report = Report::new(step, &flow.particles, &flow.frame.stencil, scheme.penalty(time_step), loads);
         report.dissipation = dissipated;
         flow.advance_positions(step); // (12)
+        report.potential_energy = potential_energy(step, flow);
         flow.walls.see_for_shift(step.settings, &flow.particles, &flow.frame);
         let Flow { particles, frame, walls, .. } = flow;
         shift(step.settings, particles, frame, walls, time_step, velocity_max, &mut self.change); // (18) (19)
@@ -184,6 +188,7 @@ impl<const D: usize> Simulation<D> {
         self.end_step(time_step);
         report.clock = self.clock;
         report.counts = self.flow.particles.counts();
+        report.places = self.flow.surface.counts();
         self.history.push(report);
         Ok(())
     }

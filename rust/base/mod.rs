@@ -6,6 +6,6 @@ mod exact_sum;
 pub mod lanes;
 pub mod parallel;
 
-pub use algebra::{Matrix, Vector};
+pub use algebra::{Matrix, Tensor, Vector, symmetric_eigen};
 pub use error::{Error, Result};
 pub use exact_sum::{ExactSum, exact_sums};

@@ -9,7 +9,8 @@ mod stencil;
 pub use correction::Correction;
 pub use operator::{Neighbours, Nothing, Operator};
 pub use operators::{
-    Divergence, Gradient, GradientAndLaplacian, Laplacian, LaplacianAndGradient, LaplacianDiagonal, VelocityGradient,
+    AdjointGradient, ConservativeGradient, Divergence, Gradient, GradientAndLaplacian, Laplacian, LaplacianAndGradient,
+    LaplacianAndItsSum, LaplacianDiagonal, Largest, Surroundings, VelocityGradient,
 };
 pub use printed::vector_laplacian;
 pub use stencil::{Corrected, Stencil};

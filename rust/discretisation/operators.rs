@@ -3,8 +3,8 @@
 //! Every operator sums weights times differences, so a constant field has derivatives of exactly zero, and corrects the sum
 //! with the tensor made of the same weights, so a linear field has its exact gradient.
 
-use crate::base::lanes::{LANES, Lanes, add_product, matrices, vectors};
-use crate::base::{Matrix, Vector};
+use crate::base::lanes::{LANES, Lanes, add_product, matrices, norm_squared, vectors};
+use crate::base::{Matrix, Tensor, Vector};
 use crate::discretisation::correction::Correction;
 use crate::discretisation::operator::{Neighbours, Operator};
 
@@ -25,6 +25,22 @@ pub struct Laplacian<'a>(pub &'a [f64]);
 
 /// What the value of the particle itself counts in [`Laplacian`]; negative.
 pub struct LaplacianDiagonal;
+
+/// Σ slope (f_i + f_j) r_ij: what particles push each other with that carry the pressures f, in opposite directions.
+pub struct ConservativeGradient<'a>(pub &'a [f64]);
+
+/// Σ slope (M_i + M_j) r_ij of a field of symmetric matrices: with M = q α⁻¹ and equal volumes it is minus the adjoint of [`Divergence`],
+/// Σ u·(of M) = −Σ q ∇·u, and a gradient of q where neighbours are evenly spread.
+pub struct AdjointGradient<'a, const D: usize>(pub &'a [Tensor<D>]);
+
+/// ∇²f as [`Laplacian`], and −2 Σ slope (f_i − f_j) without a correction.
+pub struct LaplacianAndItsSum<'a>(pub &'a [f64]);
+
+/// What tells where a fluid ends: α (17), Σ slope r_ij, −Σ slope and −Σ slope |r_ij|.
+pub struct Surroundings;
+
+/// The largest value, above 0, of the neighbours and the particle itself, of two fields side by side.
+pub struct Largest<'a>(pub &'a [[f64; 2]]);
 
 /// ∇²u, component by component, and ∂u_k/∂x_l as the entry (k, l). In the Laplacian of particle i the solid neighbour s shows the
 /// velocity `seen(s, i)`.
@@ -48,6 +64,120 @@ impl<const D: usize> Operator<D> for Gradient<'_> {
             },
         );
         corrected(gradient, &near.corrections())
+    }
+}
+
+impl<const D: usize> Operator<D> for ConservativeGradient<'_> {
+    type Value = Vector<D>;
+
+    #[inline(always)]
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [Vector<D>; LANES] {
+        let here: V = near.cluster().lanes(|i| self.0[i]);
+        let mut gradient = [V::zero(); D];
+        near.for_each(
+            #[inline(always)]
+            |j, slope: V, r_ij| add_product(&mut gradient, (V::splat(self.0[j]) + here) * slope, r_ij),
+        );
+        vectors(gradient)
+    }
+}
+
+impl<const D: usize> Operator<D> for AdjointGradient<'_, D> {
+    type Value = Vector<D>;
+
+    #[inline(always)]
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [Vector<D>; LANES] {
+        let cluster = near.cluster();
+        let mut here = [[V::zero(); D]; D];
+        for k in 0..D {
+            for l in 0..D {
+                here[k][l] = cluster.lanes(|i| self.0[i].0[(k, l)]);
+            }
+        }
+        let mut gradient = [V::zero(); D];
+        near.for_each(
+            #[inline(always)]
+            |j, slope: V, r_ij| {
+                let there = &self.0[j].0;
+                for k in 0..D {
+                    let mut sum = V::zero();
+                    for l in 0..D {
+                        sum = sum.plus_product(V::splat(there[(k, l)]) + here[k][l], r_ij[l]);
+                    }
+                    gradient[k] = gradient[k].plus_product(sum, slope);
+                }
+            },
+        );
+        vectors(gradient)
+    }
+}
+
+impl<const D: usize> Operator<D> for LaplacianAndItsSum<'_> {
+    type Value = (f64, f64);
+
+    #[inline(always)]
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [(f64, f64); LANES] {
+        let here: V = near.cluster().lanes(|i| self.0[i]);
+        let (mut sum, mut linear) = (V::zero(), [V::zero(); D]);
+        near.for_each(
+            #[inline(always)]
+            |j, slope: V, r_ij| {
+                let difference = (V::splat(self.0[j]) - here) * slope;
+                sum += difference;
+                add_product(&mut linear, difference, r_ij);
+            },
+        );
+        let laplacian = corrected_laplacian(sum, linear, &near.corrections());
+        let sum = sum.store();
+        std::array::from_fn(|lane| (laplacian[lane], -2.0 * sum[lane]))
+    }
+}
+
+impl<const D: usize> Operator<D> for Surroundings {
+    type Value = (Matrix<D>, Vector<D>, [f64; 2]);
+
+    #[inline(always)]
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [Self::Value; LANES] {
+        let (mut alpha, mut first) = ([[V::zero(); D]; D], [V::zero(); D]);
+        let (mut sum, mut reach) = (V::zero(), V::zero());
+        near.for_each(
+            #[inline(always)]
+            |_, slope: V, r_ij| {
+                sum += slope;
+                reach = reach.plus_product(slope, norm_squared(r_ij).sqrt());
+                for k in 0..D {
+                    let weight = slope * r_ij[k];
+                    first[k] += weight;
+                    for l in 0..D {
+                        alpha[k][l] = alpha[k][l].plus_product(weight, r_ij[l]);
+                    }
+                }
+            },
+        );
+        near.corrections();
+        let (alpha, first, sum, reach) = (matrices(alpha), vectors(first), sum.store(), reach.store());
+        std::array::from_fn(|lane| (-alpha[lane], first[lane], [-sum[lane], -reach[lane]]))
+    }
+}
+
+impl<const D: usize> Operator<D> for Largest<'_> {
+    type Value = [f64; 2];
+
+    #[inline(always)]
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [[f64; 2]; LANES] {
+        let mut least: [V; 2] = std::array::from_fn(|k| near.cluster().lanes(|i| -self.0[i][k]));
+        near.for_each(
+            #[inline(always)]
+            |j, slope: V, _| {
+                let seen = slope.below(V::zero());
+                for k in 0..2 {
+                    least[k] = least[k].least(V::splat(-self.0[j][k]) * seen);
+                }
+            },
+        );
+        near.corrections();
+        let least = least.map(V::store);
+        std::array::from_fn(|lane| [-least[0][lane], -least[1][lane]])
     }
 }
 

@@ -16,8 +16,10 @@ pub struct Stencil<const D: usize> {
     pub neighbours: NeighbourList,
     /// Positions that the stencil was evaluated at, of real particles and images.
     pub position: Vec<Vector<D>>,
-    /// V_i = 1 / Σ_j W_ij, of real particles and images.
+    /// V_i of real particles and images: 1 / Σ_j W_ij, or Δx^D beside a free surface, where that sum says nothing of a volume.
     pub volume: Vec<f64>,
+    /// Σ_j W_ij of the real particles.
+    pub number_density: Vec<f64>,
     /// Correction of the real particles.
     pub correction: Vec<Correction<D>>,
     /// Whether the corrections belong to the positions.
@@ -45,7 +47,13 @@ impl<const D: usize> Stencil<D> {
             let kernel = Smoothing::new(kernel, settings.smoothing_length(), D);
             self.neighbours.for_each_mut(outputs, Volumes { kernel, position, nominal });
         });
-        mirror(&mut self.volume);
+        self.number_density.resize(real, 0.0);
+        parallel::for_each(&mut self.number_density, |i, density| *density = 1.0 / self.volume[i]);
+        if settings.free_surface.is_some() {
+            self.volume.fill(nominal);
+        } else {
+            mirror(&mut self.volume);
+        }
         self.nominal = nominal;
         self.balanced.resize(real, false);
         parallel::for_each(&mut self.balanced, |i, balanced| {

@@ -7,7 +7,7 @@
 //! [`Images::real`], and begin what they form anew with [`Images::blank`]: with [`Images::poisons`] what is stale is NaN, which shows
 //! whatever reads it.
 
-use crate::base::Vector;
+use crate::base::{Matrix, Tensor, Vector};
 use crate::base::parallel;
 use crate::halo::Poison;
 use crate::particles::Particles;
@@ -130,9 +130,35 @@ impl<const D: usize> Images<D> {
         self.renew(field, |k, value| value.mirrored(&self.sign[k]));
     }
 
+    /// [`Images::fill`] of a pressure with the gradient `slope` of each particle: across a slip wall it goes on with that.
+    pub fn fill_pressure(
+        &self,
+        pressure: &mut [f64],
+        position: &[Vector<D>],
+        slope: impl Fn(usize) -> Vector<D> + Sync + Send,
+    ) {
+        let real = pressure.len() - self.source.len();
+        let (real_pressure, images) = pressure.split_at_mut(real);
+        parallel::for_each(images, |k, p| {
+            let source = self.source[k] as usize;
+            let (slope, way) = (slope(source), position[real + k] - position[source]);
+            // A periodic side has the same pressure on both sides.
+            let walls = (0..D).filter(|&axis| self.sign[k][axis] < 0.0);
+            *p = real_pressure[source] + walls.map(|axis| slope[axis] * way[axis]).sum::<f64>();
+        });
+    }
+
     /// [`Images::fill`] of positions, which a periodic side shifts too.
     pub fn fill_positions(&self, field: &mut [Vector<D>]) {
         self.renew(field, |k, x| self.position(k, x));
+    }
+
+    pub fn source_of(&self, k: usize) -> usize {
+        self.source[k] as usize
+    }
+
+    pub fn sign_of(&self, k: usize) -> Vector<D> {
+        self.sign[k]
     }
 
     fn position(&self, k: usize, x: Vector<D>) -> Vector<D> {
@@ -160,5 +186,11 @@ impl<const D: usize, const N: usize> Mirrored<D> for [f64; N] {
 impl<const D: usize> Mirrored<D> for Vector<D> {
     fn mirrored(self, sign: &Vector<D>) -> Self {
         sign.component_mul(&self)
+    }
+}
+
+impl<const D: usize> Mirrored<D> for Tensor<D> {
+    fn mirrored(self, sign: &Vector<D>) -> Self {
+        Self(Matrix::from_fn(|k, l| sign[k] * self.0[(k, l)] * sign[l]))
     }
 }

@@ -1,6 +1,6 @@
 //! Values that can say that they are stale: NaN, which whatever is computed from them becomes too.
 
-use crate::base::Vector;
+use crate::base::{Matrix, Tensor, Vector};
 use nalgebra::ArrayStorage;
 
 /// A value that can say that it is stale.
@@ -27,6 +27,10 @@ impl<const N: usize> Poison for [f64; N] {
 
 impl<const D: usize> Poison for Vector<D> {
     const POISON: Self = Vector::from_array_storage(ArrayStorage([[f64::NAN; D]]));
+}
+
+impl<const D: usize> Poison for Tensor<D> {
+    const POISON: Self = Self(Matrix::from_array_storage(ArrayStorage([[f64::NAN; D]; D])));
 }
 
 impl<T: Poison> Poison for Option<T> {

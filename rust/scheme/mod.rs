@@ -3,6 +3,7 @@
 mod alsph;
 mod isph;
 mod projection;
+mod surface_alsph;
 mod viscous;
 mod weakly_compressible;
 
@@ -13,6 +14,7 @@ use crate::settings::{DensityDiffusion, SchemeSettings, Settings, TimeStepLimits
 
 pub use alsph::{Alsph, Derived};
 pub use isph::Isph;
+pub use surface_alsph::SurfaceAlsph;
 pub use weakly_compressible::WeaklyCompressible;
 
 /// A scheme. What a step does beside it, from the search of neighbours to loads and shift, is the same for all.
@@ -41,7 +43,10 @@ pub trait Scheme<const D: usize>: Send + Sync {
 /// The scheme that the settings name.
 pub fn build<const D: usize>(settings: &Settings) -> Box<dyn Scheme<D>> {
     match settings.scheme {
-        SchemeSettings::Alsph => Box::new(Alsph::new(settings)),
+        SchemeSettings::Alsph => match settings.free_surface {
+            None => Box::new(Alsph::new(settings)),
+            Some(own) => Box::new(SurfaceAlsph::new(settings, own)),
+        },
         SchemeSettings::Isph(own) => Box::new(Isph::new(settings, own)),
         SchemeSettings::ExplicitIsph { sweeps, density_relaxation, .. } => {
             Box::new(Isph::explicit(settings, sweeps, density_relaxation))

@@ -27,7 +27,7 @@ use crate::settings::{Eigenvalues, Settings, SweepPressure, SweepWeights};
 
 /// κ: the share of a sweep's potential that the pressure keeps. The rest of it is mostly noise of the one step; all of the
 /// pressure comes in over a few steps.
-const PRESSURE_SHARE: f64 = 0.5;
+pub(super) const PRESSURE_SHARE: f64 = 0.5;
 
 /// a: the smallest eigenvalue that the polynomial of Chebyshev looks to, over the largest. With a tenth four sweeps go so far that
 /// disordered particles leave more ∇·u, not less.
@@ -37,7 +37,7 @@ const CHEBYSHEV_SPAN: f64 = 0.2;
 const CHEBYSHEV_DEGREE: usize = 4;
 
 /// What disordered particles may add to the largest eigenvalue of the lattice.
-const EIGENVALUE_MARGIN: f64 = 1.1;
+pub(super) const EIGENVALUE_MARGIN: f64 = 1.1;
 
 /// What the sweeps are multiplied with, lengths squared.
 #[derive(Clone, Copy, Debug)]
@@ -66,7 +66,7 @@ pub struct Projection {
 }
 
 /// The eigenvalue over the largest whose waves a sweep takes off: a zero of the polynomial.
-fn weight(settings: &Settings, sweep: usize) -> f64 {
+pub(super) fn weight(settings: &Settings, sweep: usize) -> f64 {
     match settings.sweep_weights {
         SweepWeights::Equal => 1.0,
         SweepWeights::Chebyshev => {

@@ -34,6 +34,13 @@ impl Settings {
         -2.0 * (self.dimensions as f64 + 2.0) / (2.0 + trace) * slopes.iter().map(|(_, slope)| slope).sum::<f64>()
     }
 
+    /// −Σ slope and −Σ slope |r_ij| of a particle of the lattice, times Δx² and Δx.
+    pub fn lattice_sums(&self) -> (f64, f64) {
+        let (slopes, _) = self.lattice_slopes();
+        let distance = |r: &[f64; 3]| r.iter().map(|x| x * x).sum::<f64>().sqrt();
+        (-slopes.iter().map(|(_, slope)| slope).sum::<f64>(), -slopes.iter().map(|(r, slope)| slope * distance(r)).sum::<f64>())
+    }
+
     /// The same of −∇·∇, the divergence of the gradient: three to five times smaller, since both operators miss short waves.
     pub fn largest_projection_eigenvalue(&self) -> f64 {
         let (slopes, trace) = self.lattice_slopes();

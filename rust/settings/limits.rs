@@ -26,6 +26,7 @@ impl Settings {
     pub fn time_step_limits(&self, velocity_max: f64, largest: Eigenvalues) -> TimeStepLimits {
         let gravity = self.body_force.iter().map(|g| g * g).sum::<f64>().sqrt();
         let h = self.smoothing_length();
+        let velocity_max = velocity_max.max(self.free_surface.map_or(0.0, |surface| surface.reference_velocity));
         let spacing = self.particle_spacing;
         let wave = |constant: f64| velocity_max * (constant * largest.laplacian / 2.0).sqrt();
         TimeStepLimits {

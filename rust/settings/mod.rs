@@ -14,7 +14,7 @@ pub use domain::{Body, Boundary, Domain};
 pub use lattice::Eigenvalues;
 pub use limits::TimeStepLimits;
 pub use rules::{
-    DensityDiffusion, DerivativeFrame, ProjectionSettings, SchemeSettings, Shifting, Solver, SweepPressure, SweepWeights,
+    DensityDiffusion, DerivativeFrame, FreeSurface, PressureGradient, ProjectionSettings, SchemeSettings, Shifting, Solver, SweepPressure, SweepWeights,
     VelocityLaplacian, WallPressure, WallVelocity,
 };
 
@@ -52,6 +52,9 @@ pub struct Settings {
     pub time_step_safety: f64,
     #[serde(default)]
     pub scheme: SchemeSettings,
+    /// None if the fluid fills the domain.
+    #[serde(default)]
+    pub free_surface: Option<FreeSurface>,
     pub derivative_frame: DerivativeFrame,
     /// Search the neighbours again in every iteration (Fatehi et al. 2019). Only with the updated frame.
     pub search_every_iteration: bool,

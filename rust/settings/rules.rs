@@ -73,6 +73,29 @@ impl ProjectionSettings {
     }
 }
 
+/// A surface that is free: beyond it is air of no pressure.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FreeSurface {
+    /// U₀, such as √(gH): the least that u_max counts in the time step, so that a fluid at rest has one.
+    pub reference_velocity: f64,
+    pub pressure_gradient: PressureGradient,
+    /// Whether the pressure may fall below that of the air, as in a fluid that turns or is stretched.
+    pub tension: bool,
+    /// α: how much of a number density above the lattice's a step takes off beside ∇·u.
+    pub density_relaxation: f64,
+}
+
+/// The pressure gradient of a fluid with a free surface: forces between two particles are equal and opposite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PressureGradient {
+    /// Σ (p_i + p_j) ∇W V_j: momentum is kept, angular momentum too.
+    Conservative,
+    /// Σ (p_i B_i + p_j B_j) ∇W V_j, minus the adjoint of the divergence: energy is kept, too.
+    Adjoint,
+}
+
 /// How the Poisson equation of the pressure is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -1,0 +1,311 @@
+//! The ALSPH step of a fluid with a free surface.
+//!
+//! Equations (8), (10) and (11) with operators that neither make energy nor lose momentum where the support of a particle is cut:
+//!
+//! ```text
+//! u*    = u^n + Δt (r_AL G*(w q) + ν ∇²u),                        q = ∇·u^m − θ                  (8)
+//! p^{m+1} = p^m − r_AL w (ρ (∇·u* − θ) − Δt ∇²p^m)                                              (10)
+//! u^{m+1} = u* + Δt (g − P(p^{m+1})/ρ)                                                            (11)
+//! ```
+//!
+//! G* is minus the adjoint of the divergence, w a weight that is 1 inside, P a gradient that is antisymmetric in pairs. In ∇²p next to
+//! the surface the neighbours that are missing are air, at p = 0.
+
+use crate::base::{Matrix, Tensor, Vector, parallel};
+use crate::boundary::{VelocityRule, conditions, extend_pressure, extrapolate_scalar};
+use crate::discretisation::{AdjointGradient, ConservativeGradient, Divergence, LaplacianAndGradient, LaplacianAndItsSum};
+use crate::flow::{Flow, Step};
+use crate::particles::{ParticleKind, Particles};
+use crate::scheme::projection::{EIGENVALUE_MARGIN, PRESSURE_SHARE, weight};
+use crate::scheme::{Derived, Scheme, Solved};
+use crate::settings::{Eigenvalues, FreeSurface, PressureGradient, Settings, TimeStepLimits};
+use crate::surface::{Place, Surface};
+
+#[derive(Debug)]
+pub struct SurfaceAlsph<const D: usize> {
+    own: FreeSurface,
+    largest: Eigenvalues,
+    /// r_AL of the step.
+    penalty: f64,
+    undisturbed: f64,
+    derived: Vec<Derived<D>>,
+    /// S of u^n, real particles.
+    strain_rate: Vec<Tensor<D>>,
+    /// Of the real particles that see air: the pressure of that surface.
+    surface_pressure: Vec<f64>,
+    /// ∇·u less θ; that of solids extrapolated.
+    divergence: Vec<f64>,
+    /// What G* is taken of.
+    tensor: Vec<Tensor<D>>,
+    velocity_star: Vec<Vector<D>>,
+    pressure_laplacian: Vec<f64>,
+    near_walls: Vec<Vector<D>>,
+}
+
+impl<const D: usize> SurfaceAlsph<D> {
+    pub fn new(settings: &Settings, own: FreeSurface) -> Self {
+        Self {
+            own,
+            largest: settings.largest_eigenvalues(),
+            penalty: f64::NAN,
+            undisturbed: settings.undisturbed_volume(),
+            derived: Vec::new(),
+            strain_rate: Vec::new(),
+            surface_pressure: Vec::new(),
+            divergence: Vec::new(),
+            tensor: Vec::new(),
+            velocity_star: Vec::new(),
+            pressure_laplacian: Vec::new(),
+            near_walls: Vec::new(),
+        }
+    }
+
+    /// What ∇·u^{n+1} is to be in the frame, and ∇²u^n.
+    fn begin(&mut self, step: Step, flow: &mut Flow<D>) {
+        let Flow { particles, frame, walls, surface, .. } = flow;
+        walls.see(step.settings, particles, frame);
+        let walls = &*walls;
+        frame.images.blank(&mut self.derived, particles.real);
+        frame.images.blank(&mut self.divergence, particles.len());
+        frame.images.blank(&mut self.strain_rate, particles.real);
+        let (place, density) = (&surface.place, &frame.stencil.number_density);
+        let (relaxation, undisturbed) = (self.own.density_relaxation / step.time_step, self.undisturbed);
+        let velocity = &particles.velocity;
+        frame.stencil.for_each(
+            LaplacianAndGradient { velocity, seen: |s, i| walls.seen_by(particles, s, i) },
+            &mut self.derived,
+            &mut self.strain_rate,
+            |i, (laplacian, gradient), derived, strain_rate| {
+                let mut solenoidal = step.settings.derivative_frame.solenoidal_divergence(&gradient, step.time_step);
+                if !matches!(place[i], Place::AtSurface | Place::Isolated) {
+                    solenoidal += relaxation * (undisturbed * density[i] - 1.0).max(0.0);
+                }
+                *derived = Derived { laplacian, solenoidal };
+                strain_rate.0 = (gradient + gradient.transpose()) * 0.5;
+            },
+        );
+        let (strain_rate, derived) = (&self.strain_rate, &self.derived);
+        parallel::for_each(frame.images.real(&mut self.divergence), |i, divergence| {
+            *divergence = strain_rate[i].0.trace() - derived[i].solenoidal;
+        });
+    }
+
+    /// The viscous term next to the surface, where no stress acts on the fluid from outside: of the stress 2ν S it is what the pressure's
+    /// gradient is of the pressure, so that Σ u·(term) is minus what 2ν S:S takes. And the pressure that answers the stress there.
+    fn free_of_stress(&mut self, step: Step, Flow { particles, frame, surface, .. }: &Flow<D>) {
+        let viscosity = step.settings.kinematic_viscosity;
+        frame.images.blank(&mut self.surface_pressure, particles.real);
+        let strain_rate = &self.strain_rate;
+        parallel::for_each(&mut self.surface_pressure, |i, pressure| {
+            let normal = surface.normal(i);
+            *pressure = if surface.place[i].sees_air() {
+                2.0 * step.settings.density * viscosity * (strain_rate[i].0 * normal).dot(&normal)
+            } else {
+                0.0
+            };
+        });
+        if viscosity == 0.0 {
+            return;
+        }
+        frame.images.blank(&mut self.tensor, particles.len());
+        parallel::for_each(frame.images.real(&mut self.tensor), |i, tensor| {
+            tensor.0 = strain_rate[i].0 * frame.stencil.correction[i].inverse * 2.0;
+        });
+        frame.images.fill(&mut self.tensor);
+        frame.stencil.for_each_one(AdjointGradient(&self.tensor), &mut self.derived, |i, value, derived| {
+            if surface.place[i].sees_air() {
+                derived.laplacian = value;
+            }
+        });
+    }
+
+    /// w q B of all particles, from the divergence of the fluid.
+    fn form_tensor(&mut self, step: Step, Flow { particles, frame, surface, .. }: &Flow<D>) {
+        extrapolate_scalar(step.settings, frame, &particles.kind[..particles.real], &mut self.divergence);
+        frame.images.blank(&mut self.tensor, particles.len());
+        let (divergence, weight) = (&self.divergence, &surface.weight);
+        parallel::for_each(frame.images.real(&mut self.tensor), |i, tensor| {
+            tensor.0 = if particles.kind[i] == ParticleKind::Solid {
+                Matrix::identity() * divergence[i]
+            } else {
+                frame.stencil.correction[i].inverse * (weight[i] * divergence[i])
+            };
+        });
+        frame.images.fill(&mut self.tensor);
+    }
+
+    fn extend_pressure(&mut self, step: Step, Flow { particles, frame, body_force, surface, .. }: &mut Flow<D>) {
+        extend_pressure(step.settings, frame, particles, body_force, &mut self.near_walls);
+        let (place, density) = (&surface.place, step.settings.density);
+        frame.images.fill_pressure(&mut particles.pressure, &particles.position, |i| match place[i] {
+            Place::Inside | Place::Near => body_force.at(i) * density,
+            Place::AtSurface | Place::Isolated => Vector::zeros(),
+        });
+    }
+
+    fn predict_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
+        self.form_tensor(step, flow);
+        let Flow { particles, frame, before, .. } = flow;
+        let condition = conditions(step.settings);
+        let (dt, viscosity, penalty) = (step.time_step, step.settings.kinematic_viscosity, self.penalty);
+        frame.images.blank(&mut self.velocity_star, particles.len());
+        let derived = &self.derived;
+        frame.stencil.for_each_one(
+            AdjointGradient(&self.tensor),
+            frame.images.real(&mut self.velocity_star),
+            |i, gradient, star| {
+                *star = before.velocity[i];
+                if condition(particles.kind[i], &particles.position[i]).velocity == VelocityRule::Solved {
+                    *star += (gradient * penalty + derived[i].laplacian * viscosity) * dt;
+                }
+            },
+        );
+        frame.images.fill(&mut self.velocity_star);
+    }
+
+    fn update_pressure(&mut self, step: Step, flow: &mut Flow<D>) {
+        let Flow { particles, frame, surface, .. } = &mut *flow;
+        frame.images.blank(&mut self.pressure_laplacian, particles.real);
+        let Surface { place, weight, missing, .. } = &*surface;
+        let (pressure, air) = (&particles.pressure, &self.surface_pressure);
+        frame.stencil.for_each_one(
+            LaplacianAndItsSum(pressure),
+            &mut self.pressure_laplacian,
+            |i, (laplacian, sum), out| {
+                *out = if place[i].sees_air() { sum - missing[i] * (pressure[i] - air[i]) } else { laplacian };
+            },
+        );
+        let Particles { kind, pressure, .. } = particles;
+        let (density, dt, penalty) = (step.settings.density, step.time_step, self.penalty);
+        let (laplacian, derived, tension) = (&self.pressure_laplacian, &self.derived, self.own.tension);
+        frame.stencil.for_each_one(Divergence(&self.velocity_star), frame.images.real(pressure), |i, divergence, p| {
+            if kind[i] == ParticleKind::Solid {
+                return;
+            }
+            if place[i] == Place::Isolated {
+                *p = 0.0;
+                return;
+            }
+            *p -= penalty * weight[i] * (density * (divergence - derived[i].solenoidal) - dt * laplacian[i]);
+            if !tension {
+                *p = p.max(0.0);
+            }
+        });
+        self.extend_pressure(step, flow);
+    }
+
+    fn correct_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
+        let Flow { particles, frame, body_force, surface, .. } = flow;
+        if self.own.pressure_gradient == PressureGradient::Adjoint {
+            frame.images.blank(&mut self.tensor, particles.len());
+            parallel::for_each(frame.images.real(&mut self.tensor), |i, tensor| {
+                tensor.0 = frame.stencil.correction[i].inverse * particles.pressure[i];
+            });
+            frame.images.fill(&mut self.tensor);
+            let real = particles.real;
+            for k in real..particles.len() {
+                // The image's own pressure.
+                let source = frame.images.source_of(k - real);
+                let ratio = particles.pressure[k] - particles.pressure[source];
+                let sign = frame.images.sign_of(k - real);
+                let inverse = frame.stencil.correction[source].inverse;
+                self.tensor[k].0 += Matrix::from_fn(|a, b| sign[a] * inverse[(a, b)] * sign[b]) * ratio;
+            }
+        }
+        let Particles { kind, position, pressure, velocity, .. } = particles;
+        let (star, place) = (&self.velocity_star, &surface.place);
+        let condition = conditions(step.settings);
+        let (dt, density) = (step.time_step, step.settings.density);
+        let correct = |i: usize, gradient: Vector<D>, u: &mut Vector<D>| {
+            if condition(kind[i], &position[i]).velocity == VelocityRule::Solved {
+                let push = if place[i] == Place::Isolated { Vector::zeros() } else { gradient / density };
+                *u = star[i] + (body_force.at(i) - push) * dt;
+            }
+        };
+        let real = frame.images.real(velocity);
+        match self.own.pressure_gradient {
+            PressureGradient::Conservative => frame.stencil.for_each_one(ConservativeGradient(pressure), real, correct),
+            PressureGradient::Adjoint => frame.stencil.for_each_one(AdjointGradient(&self.tensor), real, correct),
+        }
+        frame.images.fill(velocity);
+    }
+
+    fn measure_divergence(&mut self, Flow { particles, frame, .. }: &Flow<D>) {
+        let derived = &self.derived;
+        frame.stencil.for_each_one(
+            Divergence(&particles.velocity),
+            frame.images.real(&mut self.divergence),
+            |i, value, out| *out = value - derived[i].solenoidal,
+        );
+    }
+
+    fn sweep(&mut self, step: Step, flow: &mut Flow<D>) {
+        let area = step.settings.particle_spacing.powi(2);
+        let relaxation = area / (EIGENVALUE_MARGIN * self.largest.projection);
+        for sweep in 0..step.settings.projection_sweeps {
+            let relaxation = relaxation / weight(step.settings, sweep);
+            let factor = PRESSURE_SHARE * step.settings.density * relaxation / step.time_step;
+            self.measure_divergence(flow);
+            self.form_tensor(step, flow);
+            let Flow { particles, frame, surface, .. } = &mut *flow;
+            let condition = conditions(step.settings);
+            let Particles { kind, position, pressure, velocity, .. } = particles;
+            let (divergence, weight, place, tension) =
+                (&self.divergence, &surface.weight, &surface.place, self.own.tension);
+            let (real_pressure, real_velocity) = (frame.images.real(pressure), frame.images.real(velocity));
+            frame.stencil.for_each(AdjointGradient(&self.tensor), real_velocity, real_pressure, |i, gradient, u, p| {
+                if condition(kind[i], &position[i]).velocity == VelocityRule::Solved && place[i] != Place::Isolated {
+                    *u += gradient * relaxation;
+                    *p -= factor * weight[i] * divergence[i];
+                    if !tension {
+                        *p = p.max(0.0);
+                    }
+                }
+            });
+            frame.images.fill(velocity);
+        }
+        self.extend_pressure(step, flow);
+    }
+}
+
+impl<const D: usize> Scheme<D> for SurfaceAlsph<D> {
+    fn limits(&self, settings: &Settings, velocity_max: f64) -> TimeStepLimits {
+        settings.time_step_limits(velocity_max, self.largest)
+    }
+
+    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> Solved {
+        let velocity = step.velocity_max.max(self.own.reference_velocity);
+        self.penalty = step.settings.penalty(velocity, step.time_step, self.largest.laplacian);
+        self.begin(step, flow);
+        self.free_of_stress(step, flow);
+        self.extend_pressure(step, flow);
+        for iteration in 1..=step.settings.max_iterations {
+            if iteration > 1 {
+                self.measure_divergence(flow);
+            }
+            self.predict_velocity(step, flow); // (8)
+            self.update_pressure(step, flow); // (10)
+            self.correct_velocity(step, flow); // (11)
+        }
+        self.sweep(step, flow);
+        self.measure_divergence(flow);
+        flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
+        Solved::after(step.settings.max_iterations)
+    }
+
+    fn divergence(&self, i: usize) -> f64 {
+        self.divergence[i]
+    }
+
+    fn acting_pressure(&self, _: Step, particles: &Particles<D>, i: usize) -> f64 {
+        particles.pressure[i]
+    }
+
+    fn viscous_laplacian(&self, _: Step, i: usize) -> Vector<D> {
+        self.derived[i].laplacian
+    }
+
+    fn penalty(&self, _: f64) -> f64 {
+        self.penalty
+    }
+}

@@ -1,0 +1,179 @@
+//! A free surface: which particles lie at it, and how much their neighbours can carry.
+//!
+//! Where the support of a particle is cut, α falls below the identity: its trace d to 0.6 D at a flat surface, its smallest eigenvalue λ to one
+//! half. Both tell where the fluid ends (Lee et al. 2008, Marrone et al. 2010), and λ how far a gradient there can be trusted.
+
+use crate::base::{Matrix, Tensor, Vector, parallel, symmetric_eigen};
+use crate::discretisation::{Correction, Largest, Surroundings};
+use crate::frame::Frame;
+use crate::halo::Poison;
+use crate::particles::{ParticleKind, Particles};
+use crate::settings::Settings;
+
+/// Of tr α over D: below it a particle is at the surface if nothing lies before it.
+const CANDIDATE: f64 = 0.875;
+
+/// Below it, it is so whatever lies before it.
+const CERTAIN: f64 = 0.5;
+
+/// Below it, it has too few neighbours to be pushed by them: a row of particles has 0.21, two have 0.46.
+const ISOLATED: f64 = 0.35;
+
+/// Above it, nothing of its support is cut.
+const WHOLE: f64 = 0.98;
+
+/// Eigenvalues of α below it are taken for it in α⁻¹: a flat surface has one half, thinner parts get less than a whole correction.
+const FLOOR: f64 = 0.5;
+
+/// Cosine of the half angle of the cone along the normal in which a particle at the surface has no neighbours, and its length over h.
+const CONE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+const CONE_LENGTH: f64 = 2.0;
+
+/// Where a particle is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Place {
+    #[default]
+    Inside,
+    /// Its support is cut, and it has particles at the surface in it.
+    Near,
+    AtSurface,
+    /// It flies: no neighbour pushes it.
+    Isolated,
+}
+
+impl Place {
+    /// Whether part of what surrounds it is air.
+    pub fn sees_air(self) -> bool {
+        matches!(self, Self::Near | Self::AtSurface)
+    }
+}
+
+/// What the surface of one frame is.
+#[derive(Debug, Default)]
+pub struct Surface<const D: usize> {
+    /// Of the real particles.
+    pub place: Vec<Place>,
+    /// How much of ∇·u a particle may push with, of the real particles: λ², and less where neighbours are so close that they would push too hard.
+    pub weight: Vec<f64>,
+    /// Twice the sum of slopes, negative, of the neighbours that the air has the place of, over that of the lattice the rest.
+    pub missing: Vec<f64>,
+    found: Vec<Found<D>>,
+    /// Of real particles and images: how hard neighbours push a particle over the lattice's, and 1 at the surface.
+    strength: Vec<[f64; 2]>,
+    near: Vec<[f64; 2]>,
+}
+
+/// What a particle's own neighbours tell.
+#[derive(Clone, Copy, Debug)]
+struct Found<const D: usize> {
+    /// tr α over D.
+    trace: f64,
+    /// Smallest eigenvalue of α.
+    least: f64,
+    /// −Σ slope.
+    sum: f64,
+    /// α⁻¹, with a floor under the eigenvalues of α.
+    inverse: Matrix<D>,
+    /// Σ slope r_ij.
+    first: Vector<D>,
+}
+
+impl<const D: usize> Poison for Found<D> {
+    const POISON: Self =
+        Self { trace: f64::NAN, least: f64::NAN, sum: f64::NAN, inverse: Tensor::<D>::POISON.0, first: <Vector<D> as Poison>::POISON };
+}
+
+impl<const D: usize> Surface<D> {
+    /// Particles at the surface, and those that are alone.
+    pub fn counts(&self) -> [usize; 2] {
+        [Place::AtSurface, Place::Isolated].map(|place| self.place.iter().filter(|&&other| other == place).count())
+    }
+
+    /// Unit normal of the surface at particle `i`, out of the fluid; zero where nothing tells it.
+    pub fn normal(&self, i: usize) -> Vector<D> {
+        -(self.found[i].inverse * self.found[i].first).try_normalize(0.0).unwrap_or_else(Vector::zeros)
+    }
+
+    /// Find it in a frame, whose corrections it makes those of a cut support.
+    pub fn find(&mut self, settings: &Settings, particles: &Particles<D>, frame: &mut Frame<D>) {
+        let (sum, reach) = settings.lattice_sums();
+        let spacing = settings.particle_spacing;
+        let (sum, reach) = (sum / spacing.powi(2), reach / spacing);
+        let real = particles.real;
+        frame.images.blank(&mut self.found, real);
+        frame.images.blank(&mut self.strength, particles.len());
+        let strength = frame.images.real(&mut self.strength);
+        frame.stencil.correct_and_for_each(
+            Surroundings,
+            &mut self.found,
+            strength,
+            |_, (alpha, first, [slopes, lengths]), found, strength| {
+                let (values, vectors) = symmetric_eigen(&alpha);
+                let inverse = inverse_with_floor(&values, &vectors);
+                let least = values.min();
+                *found = Found { trace: alpha.trace() / D as f64, least, sum: slopes, inverse, first };
+                *strength = [lengths / values.min().max(FLOOR) / reach, 0.0];
+            },
+        );
+        let found = &self.found;
+        parallel::for_each(&mut frame.stencil.correction, |i, correction| {
+            if particles.kind[i] == ParticleKind::Fluid {
+                let Found { inverse, first, .. } = &found[i];
+                *correction = Correction { inverse: *inverse, asymmetry: inverse * first, ..*correction };
+            }
+        });
+        self.place.resize(real, Place::Inside);
+        let (stencil, found) = (&frame.stencil, &self.found);
+        let length = CONE_LENGTH * settings.smoothing_length();
+        let cone_is_empty = |i: usize| {
+            let normal = -(found[i].inverse * found[i].first).normalize();
+            stencil.neighbours.row(i).0.all().iter().all(|entry| {
+                let way = stencil.position[entry.j()] - stencil.position[i];
+                let distance = way.norm();
+                distance >= length || distance == 0.0 || way.dot(&normal) <= CONE * distance
+            })
+        };
+        parallel::for_each(&mut self.place, |i, place| {
+            let Found { trace, .. } = found[i];
+            *place = if particles.kind[i] != ParticleKind::Fluid {
+                Place::Inside
+            } else if trace < ISOLATED {
+                Place::Isolated
+            } else if trace < CERTAIN || (trace < CANDIDATE && cone_is_empty(i)) {
+                Place::AtSurface
+            } else {
+                Place::Inside
+            };
+        });
+        let place = &self.place;
+        parallel::for_each(frame.images.real(&mut self.strength), |i, strength| {
+            strength[1] = f64::from(u8::from(place[i] == Place::AtSurface));
+        });
+        frame.images.fill(&mut self.strength);
+        frame.images.blank(&mut self.near, real);
+        frame.stencil.for_each_one(Largest(&self.strength), &mut self.near, |_, value, near| *near = value);
+        let near = &self.near;
+        self.weight.resize(real, 0.0);
+        parallel::for_each(&mut self.place, |i, place| {
+            if *place == Place::Inside && particles.kind[i] == ParticleKind::Fluid && found[i].trace < WHOLE && near[i][1] > 0.0 {
+                *place = Place::Near;
+            }
+        });
+        let place = &self.place;
+        parallel::for_each(&mut self.weight, |i, weight| {
+            *weight = if place[i] == Place::Isolated {
+                0.0
+            } else {
+                1.0f64.min(found[i].least.powi(2)).min(near[i][0].powi(-2))
+            };
+        });
+        self.missing.resize(real, 0.0);
+        parallel::for_each(&mut self.missing, |i, missing| *missing = 2.0 * (sum - found[i].sum).max(0.0));
+    }
+}
+
+/// α⁻¹ from eigenvalues and eigenvectors of α, of which none counts less than [`FLOOR`].
+fn inverse_with_floor<const D: usize>(values: &Vector<D>, vectors: &Matrix<D>) -> Matrix<D> {
+    let inverse = Matrix::from_diagonal(&values.map(|value| 1.0 / value.max(FLOOR)));
+    vectors * inverse * vectors.transpose()
+}
