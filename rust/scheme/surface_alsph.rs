@@ -69,7 +69,7 @@ impl<const D: usize> SurfaceAlsph<D> {
         frame.images.blank(&mut self.divergence, particles.len());
         frame.images.blank(&mut self.strain_rate, particles.real);
         let (place, density) = (&surface.place, &frame.stencil.number_density);
-        let (relaxation, undisturbed) = (self.own.density_relaxation / step.time_step, self.undisturbed);
+        let (relaxation, undisturbed) = (self.own.packing_relaxation / step.time_step, self.undisturbed);
         let velocity = &particles.velocity;
         frame.stencil.for_each(
             LaplacianAndGradient { velocity, seen: |s, i| walls.seen_by(particles, s, i) },

@@ -173,9 +173,31 @@ impl Settings {
         self.kernel.validate(self.dimensions)?;
         self.kernel.validate(self.dimensions - 1)?;
         self.validate_scheme()?;
+        self.validate_free_surface()?;
         domain::validate_vector("body_force", &self.body_force, self.dimensions)?;
         domain::validate_bodies(&self.bodies, self.dimensions)?;
         self.domain.validate(self.dimensions, self.support_radius())
+    }
+
+    fn validate_free_surface(&self) -> Result<()> {
+        let Some(surface) = self.free_surface else { return Ok(()) };
+        surface.validate()?;
+        let sides = self.domain.boundaries.iter().flatten();
+        for (name, fits, needed) in [
+            ("scheme", self.scheme == SchemeSettings::Alsph, "alsph"),
+            ("derivative_frame", self.derivative_frame != DerivativeFrame::Updated, "midpoint or initial"),
+            ("shifting", self.shifting == Shifting::None, "none"),
+            ("viscous_order", self.viscous_order == 2, "2"),
+            ("velocity_laplacian", self.velocity_laplacian == VelocityLaplacian::Scalar, "scalar"),
+            ("wall_pressure", self.wall_pressure != WallPressure::Paper, "linear or adami"),
+            ("bodies", self.bodies.is_empty(), "none"),
+            ("domain", !sides.clone().any(|side| matches!(side, Boundary::Inlet | Boundary::Outlet)), "without inlets and outlets"),
+        ] {
+            if !fits {
+                return Err(setting(name, format!("must be {needed} beside a free surface")));
+            }
+        }
+        Ok(())
     }
 
     fn validate_scheme(&self) -> Result<()> {

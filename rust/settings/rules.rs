@@ -83,7 +83,21 @@ pub struct FreeSurface {
     /// Whether the pressure may fall below that of the air, as in a fluid that turns or is stretched.
     pub tension: bool,
     /// α: how much of a number density above the lattice's a step takes off beside ∇·u.
-    pub density_relaxation: f64,
+    pub packing_relaxation: f64,
+}
+
+impl FreeSurface {
+    pub(super) fn validate(&self) -> Result<()> {
+        if !(self.reference_velocity.is_finite() && self.reference_velocity > 0.0) {
+            let problem = format!("must be a positive number, not {}", self.reference_velocity);
+            return Err(setting("free_surface.reference_velocity", problem));
+        }
+        if !(0.0..=1.0).contains(&self.packing_relaxation) {
+            let problem = format!("must lie in 0..1, not {}", self.packing_relaxation);
+            return Err(setting("free_surface.packing_relaxation", problem));
+        }
+        Ok(())
+    }
 }
 
 /// The pressure gradient of a fluid with a free surface: forces between two particles are equal and opposite.

@@ -26,13 +26,19 @@ from alsph.cases.channel import Channel
 from alsph.cases.couette import Couette
 from alsph.cases.cylinder import Cylinder
 from alsph.cases.cylinder_pair import CylinderPair
+from alsph.cases.dam_break import DamBreak
+from alsph.cases.elliptical_drop import EllipticalDrop
+from alsph.cases.free_surface import FreeSurface
 from alsph.cases.nozzle import Nozzle
 from alsph.cases.pipe import Pipe
 from alsph.cases.poiseuille import Poiseuille
 from alsph.cases.pressure_jump import PressureJump
 from alsph.cases.pulsating_channel import PulsatingChannel
+from alsph.cases.rotating_patch import RotatingPatch
 from alsph.cases.spatial import Spatial
 from alsph.cases.sphere import Sphere
+from alsph.cases.standing_wave import StandingWave
+from alsph.cases.still_water import StillWater
 from alsph.cases.taylor_couette import TaylorCouette
 from alsph.cases.taylor_green import TaylorGreen
 from alsph.errors import ConfigError
@@ -44,6 +50,7 @@ CASES: dict[str, type[Case]] = {
     for case in (
         *(Cylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Nozzle, Bend, Cavity),
         *(Poiseuille, Couette, TaylorCouette, PulsatingChannel, Pipe, PressureJump, TaylorGreen),
+        *(DamBreak, StandingWave, StillWater, EllipticalDrop, RotatingPatch),
     )
 }
 
@@ -58,17 +65,23 @@ __all__ = [
     "Cavity",
     "Channel",
     "Couette",
+    "DamBreak",
     "Cylinder",
     "CylinderPair",
     "Domain",
+    "EllipticalDrop",
+    "FreeSurface",
     "Nozzle",
     "Pipe",
     "Poiseuille",
     "PressureJump",
     "PulsatingChannel",
+    "RotatingPatch",
     "SolidBody",
     "Spatial",
     "Sphere",
+    "StandingWave",
+    "StillWater",
     "TaylorCouette",
     "TaylorGreen",
     "find",

@@ -1,0 +1,78 @@
+"""A drop that is stretched into an ellipse, with its exact solution."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy.integrate import solve_ivp
+
+from alsph.analysis.measures import Measure
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
+from alsph.cases.free_surface import FreeSurface
+from alsph.geometry.domain import Domain
+from alsph.geometry.lattice import cell_centres, lattice
+
+
+class EllipticalDrop(FreeSurface):
+    """A round drop of radius D with the velocity U (−x, y)/D, without gravity: it becomes an ever longer ellipse."""
+
+    name: ClassVar[str] = "elliptical_drop"
+    title: ClassVar[str] = "drop that is stretched into an ellipse"
+    gravity: ClassVar[bool] = False
+
+    resolution: int = Field(default=40, ge=8, description="particles per radius, D/Δx [-]")
+
+    @property
+    def default_until(self) -> float:
+        """When the drop is twice as long as at first."""
+        return 0.8
+
+    def domain(self) -> Domain:
+        """Return a box that is open on all sides."""
+        return Domain([-3, -6], [3, 6], [("none", "none")] * 2)
+
+    def particles(self) -> dict[str, NDArray[Any]]:
+        """Return those particles of a lattice that lie in the circle."""
+        axis = cell_centres(2 * self.resolution, self.particle_spacing) - 1
+        position = lattice(axis, axis)
+        position = position[(position**2).sum(axis=1) < 1]
+        return self.fluid(position, position * [-1.0, 1.0], (1 - (position**2).sum(axis=1)) / 2)
+
+    def exact(self, time: float) -> tuple[float, float]:
+        """Return the long semi-axis a [D] and the strain rate A [U/D]: da/dt = A a, dA/dt = A² (1 − a⁴)/(1 + a⁴)."""
+
+        def rates(_: float, state: FloatArray) -> list[float]:
+            a, rate = state
+            return [rate * a, rate**2 * (1 - a**4) / (1 + a**4)]
+
+        a, rate = solve_ivp(rates, (0, time), [1.0, 1.0], rtol=1e-10, atol=1e-12).y[:, -1]
+        return float(a), float(rate)
+
+    def measures(self, run: Record) -> list[Measure]:
+        """Return semi-axes and pressure at the centre of the last snapshot, and the kinetic energy over its start."""
+        rows = self.energy_measures(run)
+        if not len(run.times) or run.times[-1] <= 0:
+            return rows
+        snapshot = run.snapshot()
+        a, rate = self.exact(snapshot.time)
+        across, along = 2 * np.sqrt((snapshot.position**2).mean(axis=0))
+        middle = (snapshot.position**2).sum(axis=1) < (3 * self.particle_spacing) ** 2
+        energy = run.history["kinetic_energy"]
+        source = "exact solution"
+        return [
+            Measure("long semi-axis, D", float(along), a, 0.01, source),
+            Measure("short semi-axis, D", float(across), 1 / a, 0.01, source),
+            Measure(
+                "pressure at the centre, ρU²",
+                float(snapshot.pressure[middle].mean()),
+                rate**2 * a**2 / (a**4 + 1),
+                0.05,
+                source,
+            ),
+            Measure("kinetic energy over its start", float(energy[-1] / energy[0]), 1.0, 0.01, source),
+            *rows,
+        ]

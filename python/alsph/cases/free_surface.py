@@ -1,0 +1,95 @@
+"""What cases of a fluid with a free surface share."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from alsph.analysis.measures import Measure
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
+from alsph.cases.base import Case
+from alsph.geometry.particles import Kind, particles
+
+COURANT = 0.2
+"""Courant number of a step where none is given: the shortest waves of the surface are those of gravity."""
+
+
+class FreeSurface(Case):
+    """A fluid with a free surface, beyond which is air of no pressure.
+
+    In cases with gravity H is the depth of the fluid, U = √(gH) and g = 1, hence times in √(H/g). A step is that of
+    ALSPH with operators that keep momentum and energy where a particle has no neighbours (docs/free_surface.md); the
+    other schemes, bodies, inlets and outlets are not there yet.
+    """
+
+    gravity: ClassVar[bool] = True
+    """Whether the body force (0, −1) acts."""
+    tension: ClassVar[bool] = False
+    """Whether the pressure may fall below that of the air, as in a fluid that turns."""
+
+    reynolds: float = Field(default=1e6, gt=0, description="Reynolds number UD/ν [-]")
+    scheme: Literal["alsph"] | None = Field(default=None, description="augmented Lagrangian SPH alone")
+    algorithm: Literal["midpoint", 2] = Field(
+        default="midpoint", description="derivatives in the middle of the step, or at initial positions"
+    )
+    shifting: Literal["none"] = Field(default="none", description="none: it would feed thin jets with energy")
+    viscous_order: Literal[2] = Field(default=2, description="order of the viscous term in Δx")
+    sweep_weights: Literal["chebyshev", "equal"] | None = Field(
+        default="equal", description="how far each projection sweep goes"
+    )
+    sweep_pressure: Literal["rough"] = Field(default="rough", description="what the pressure keeps of the sweeps")
+    pressure_gradient: Literal["adjoint", "conservative"] = Field(
+        default="adjoint",
+        description="pressure gradient: minus the adjoint of the divergence, nearer in waves, or the plain sum over "
+        "pairs, which keeps angular momentum, too",
+    )
+    packing_relaxation: float = Field(
+        default=0.0, ge=0, le=1, description="share of a number density above the lattice's that a step takes off [-]"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _step_of_a_surface(cls, values: dict[str, Any]) -> dict[str, Any]:
+        paper = any(values.get(name) is not None for name in ("courant", "time_step", "penalty_constant"))
+        return values if paper or values.get("algorithm") == 2 else values | {"courant": COURANT}
+
+    @property
+    def reference_velocity(self) -> float:
+        """The least that u_max counts in the time step [U]."""
+        return 1.0
+
+    def body_force(self) -> list[float]:
+        """Return gravity, (0, −1) [U²/D], if it acts."""
+        return [0.0, -1.0] if self.gravity else [0.0, 0.0]
+
+    def settings(self) -> dict[str, Any]:
+        """Return the engine's settings (see docs/architecture.md)."""
+        return super().settings() | {
+            "free_surface": {
+                "reference_velocity": self.reference_velocity,
+                "pressure_gradient": self.pressure_gradient,
+                "tension": self.tension,
+                "packing_relaxation": self.packing_relaxation,
+            }
+        }
+
+    def particle_estimate(self) -> int:
+        """Return about how many particles there are: those of the fluid."""
+        return len(self.particles()["kind"])
+
+    def fluid(self, position: FloatArray, velocity: FloatArray, pressure: FloatArray) -> dict[str, NDArray[Any]]:
+        """Return fluid particles, whose pressure is not below that of the air unless tension is allowed."""
+        pressure = pressure if self.tension else np.maximum(pressure, 0.0)
+        return particles(Kind.FLUID, position, velocity, pressure=pressure)
+
+    def energy_measures(self, run: Record) -> list[Measure]:
+        """Return the largest rise of kinetic and potential energy above their least value before, over their start."""
+        if not len(run.history.get("potential_energy", [])):
+            return []
+        energy = run.history["kinetic_energy"] + run.history["potential_energy"]
+        rise = (energy - np.minimum.accumulate(energy)).max() / energy[0]
+        return [Measure("largest rise of the energy over its start", float(rise), 0.0, 0.01, "energy is only lost")]

@@ -1,0 +1,54 @@
+"""Water at rest in a tank."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from alsph.analysis.measures import Measure
+from alsph.analysis.record import Record
+from alsph.cases.free_surface import FreeSurface
+from alsph.geometry.domain import Domain
+from alsph.geometry.lattice import cell_centres, lattice
+
+
+class StillWater(FreeSurface):
+    """Water of depth H at rest in a tank with slip walls: what moves is the scheme's doing."""
+
+    name: ClassVar[str] = "still_water"
+    title: ClassVar[str] = "water at rest in a tank"
+
+    length: float = Field(default=1.0, gt=0, description="length of the tank [H]")
+
+    @property
+    def default_until(self) -> float:
+        """Some five periods of the tank's longest wave."""
+        return 10.0
+
+    def domain(self) -> Domain:
+        """Return the tank, whose top is open."""
+        return Domain([0, 0], [self.length, 2], [("slip", "slip"), ("slip", "none")])
+
+    def particles(self) -> dict[str, NDArray[Any]]:
+        """Return a lattice at rest with the hydrostatic pressure."""
+        columns = self.whole_cells("length", self.length)
+        spacing = self.particle_spacing
+        position = lattice(cell_centres(columns, spacing), cell_centres(self.resolution, spacing))
+        return self.fluid(position, np.zeros_like(position), 1 - position[:, 1])
+
+    def measures(self, run: Record) -> list[Measure]:
+        """Return the largest velocity, how far the level has risen, and the error of the pressure, at the last snapshot."""
+        if not len(run.times) or run.times[-1] <= 0:
+            return []
+        snapshot, source = run.snapshot(), "hydrostatics"
+        level = snapshot.position[:, 1].max() + self.particle_spacing / 2 - 1
+        error = np.sqrt(np.mean((snapshot.pressure - (1 - snapshot.position[:, 1])) ** 2))
+        speed = np.linalg.norm(snapshot.velocity, axis=1).max()
+        return [
+            Measure("largest velocity, √(gH)", float(speed), 0.0, 1e-3, source),
+            Measure("rise of the level, Δx", float(level / self.particle_spacing), 0.0, 0.1, source),
+            Measure("error of the pressure, rms, ρgH", float(error), 0.0, 0.01, source),
+        ]
