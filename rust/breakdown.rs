@@ -96,12 +96,7 @@ fn depth<const D: usize>(settings: &Settings, particles: &Particles<D>, frame: &
 /// How far `position` lies beyond the sides of the domain that particles cannot cross.
 fn beyond_walls<const D: usize>(settings: &Settings, position: &Vector<D>) -> f64 {
     let domain = &settings.domain;
-    let open_to_air = settings.free_surface.is_some();
-    let closed = |side| match side {
-        Boundary::Inlet | Boundary::Outlet => false,
-        Boundary::None => !open_to_air,
-        Boundary::Slip | Boundary::Periodic => true,
-    };
+    let closed = |side| !matches!(side, Boundary::Inlet | Boundary::Outlet | Boundary::Air);
     (0..D).fold(0.0, |farthest: f64, axis| {
         let [lower, upper] = domain.boundaries[axis];
         let below = if closed(lower) { domain.lower[axis] - position[axis] } else { 0.0 };

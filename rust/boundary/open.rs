@@ -26,12 +26,10 @@ pub fn end_step<const D: usize>(particles: &mut Particles<D>, settings: &Setting
     of(Boundary::Slip).iter().for_each(|side| side.reflect(particles, &near));
     of(Boundary::Periodic).iter().for_each(|side| side.wrap(particles, &near, settings));
     let (mut left, mut gone) = leave(particles, &near, &of(Boundary::Outlet), settings.buffer_length());
-    if settings.free_surface.is_some() {
-        let open = of(Boundary::None);
-        let beyond = |i: &usize| open.iter().any(|side| side.inside(&particles.position[*i]) < 0.0);
-        let lost = near.iter().copied().filter(|&i| particles.kind[i] == ParticleKind::Fluid).filter(beyond);
-        gone.extend(lost.inspect(|_| left += 1));
-    }
+    let open = of(Boundary::Air);
+    let is_lost = |&i: &usize| open.iter().any(|side| side.inside(&particles.position[i]) < 0.0);
+    let lost = near.iter().copied().filter(|&i| particles.kind[i] == ParticleKind::Fluid).filter(is_lost);
+    gone.extend(lost.inspect(|_| left += 1));
     let entered = enter(particles, &near, &of(Boundary::Inlet), settings, grid);
     if !gone.is_empty() {
         let mut keep = vec![true; particles.real];

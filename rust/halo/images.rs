@@ -153,14 +153,6 @@ impl<const D: usize> Images<D> {
         self.renew(field, |k, x| self.position(k, x));
     }
 
-    pub fn source_of(&self, k: usize) -> usize {
-        self.source[k] as usize
-    }
-
-    pub fn sign_of(&self, k: usize) -> Vector<D> {
-        self.sign[k]
-    }
-
     fn position(&self, k: usize, x: Vector<D>) -> Vector<D> {
         self.sign[k].component_mul(&x) + self.offset[k]
     }

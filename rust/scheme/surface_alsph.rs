@@ -199,18 +199,11 @@ impl<const D: usize> SurfaceAlsph<D> {
         if self.own.pressure_gradient == PressureGradient::Adjoint {
             frame.images.blank(&mut self.tensor, particles.len());
             parallel::for_each(frame.images.real(&mut self.tensor), |i, tensor| {
-                tensor.0 = frame.stencil.correction[i].inverse * particles.pressure[i];
+                tensor.0 = frame.stencil.correction[i].inverse;
             });
             frame.images.fill(&mut self.tensor);
-            let real = particles.real;
-            for k in real..particles.len() {
-                // The image's own pressure.
-                let source = frame.images.source_of(k - real);
-                let ratio = particles.pressure[k] - particles.pressure[source];
-                let sign = frame.images.sign_of(k - real);
-                let inverse = frame.stencil.correction[source].inverse;
-                self.tensor[k].0 += Matrix::from_fn(|a, b| sign[a] * inverse[(a, b)] * sign[b]) * ratio;
-            }
+            // The pressure of an image is its own, beyond a wall across gravity.
+            parallel::for_each(&mut self.tensor, |i, tensor| tensor.0 *= particles.pressure[i]);
         }
         let Particles { kind, position, pressure, velocity, .. } = particles;
         let (star, place) = (&self.velocity_star, &surface.place);

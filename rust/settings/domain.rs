@@ -12,6 +12,8 @@ pub enum Boundary {
     Periodic,
     Inlet,
     Outlet,
+    /// Open to the air beyond a free surface: fluid that crosses it is lost.
+    Air,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -180,9 +180,14 @@ impl Settings {
     }
 
     fn validate_free_surface(&self) -> Result<()> {
-        let Some(surface) = self.free_surface else { return Ok(()) };
+        let has = |sides: [Boundary; 2]| self.domain.boundaries.iter().flatten().any(|side| sides.contains(side));
+        let Some(surface) = self.free_surface else {
+            if has([Boundary::Air; 2]) {
+                return Err(setting("domain.boundaries", "air lies beyond a free surface alone, which `free_surface` tells of"));
+            }
+            return Ok(());
+        };
         surface.validate()?;
-        let sides = self.domain.boundaries.iter().flatten();
         for (name, fits, needed) in [
             ("scheme", self.scheme == SchemeSettings::Alsph, "alsph"),
             ("derivative_frame", self.derivative_frame != DerivativeFrame::Updated, "midpoint or initial"),
@@ -191,7 +196,7 @@ impl Settings {
             ("velocity_laplacian", self.velocity_laplacian == VelocityLaplacian::Scalar, "scalar"),
             ("wall_pressure", self.wall_pressure != WallPressure::Paper, "linear or adami"),
             ("bodies", self.bodies.is_empty(), "none"),
-            ("domain", !sides.clone().any(|side| matches!(side, Boundary::Inlet | Boundary::Outlet)), "without inlets and outlets"),
+            ("domain.boundaries", !has([Boundary::Inlet, Boundary::Outlet]), "without inlets and outlets"),
         ] {
             if !fits {
                 return Err(setting(name, format!("must be {needed} beside a free surface")));

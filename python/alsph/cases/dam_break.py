@@ -48,7 +48,7 @@ class DamBreak(FreeSurface):
 
     def domain(self) -> Domain:
         """Return the tank, whose top is open."""
-        return Domain([0, 0], [self.tank_length, self.tank_height], [("slip", "slip"), ("slip", "none")])
+        return Domain([0, 0], [self.tank_length, self.tank_height], [("slip", "slip"), ("slip", "air")])
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return the column at rest, with the pressure of its first instant."""

@@ -33,7 +33,7 @@ class EllipticalDrop(FreeSurface):
 
     def domain(self) -> Domain:
         """Return a box that is open on all sides."""
-        return Domain([-3, -6], [3, 6], [("none", "none")] * 2)
+        return Domain([-3, -6], [3, 6], [("air", "air")] * 2)
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return those particles of a lattice that lie in the circle."""

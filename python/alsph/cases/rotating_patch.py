@@ -40,7 +40,7 @@ class RotatingPatch(FreeSurface):
 
     def domain(self) -> Domain:
         """Return a box that is open on all sides."""
-        return Domain([-4, -4], [4, 4], [("none", "none")] * 2)
+        return Domain([-4, -4], [4, 4], [("air", "air")] * 2)
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a lattice that turns, with the pressure of its first instant."""
@@ -54,10 +54,10 @@ class RotatingPatch(FreeSurface):
         x, y = (np.sin(np.pi * TERMS[:, None] * (x + 0.5)) for x in position.T)
         m, n = np.meshgrid(TERMS, TERMS, indexing="ij")
         size = -32 / (m * n * np.pi**2) / (np.pi**2 * (m**2 + n**2))
-        return np.einsum("mn,mk,nk->k", size, x, y)
+        return np.asarray(np.einsum("mn,mk,nk->k", size, x, y))
 
     def measures(self, run: Record) -> list[Measure]:
-        """Return angular momentum and kinetic energy of the last snapshot over their start, which an inviscid fluid keeps."""
+        """Return angular momentum and kinetic energy at the end over their start, which an inviscid fluid keeps."""
         rows = self.energy_measures(run)
         if not len(run.times) or run.times[-1] <= 0:
             return rows

@@ -39,7 +39,7 @@ class StandingWave(FreeSurface):
 
     def domain(self) -> Domain:
         """Return the tank, whose top is open."""
-        return Domain([0, 0], [1, 2], [("slip", "slip"), ("slip", "none")])
+        return Domain([0, 0], [1, 2], [("slip", "slip"), ("slip", "air")])
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a lattice moved as the water is by the wave, without a change of volume, at rest."""
@@ -53,8 +53,8 @@ class StandingWave(FreeSurface):
     def growth(self) -> complex:
         """Return −(decay rate) + i (frequency) of the mode [√(g/H)], from the linear theory.
 
-        The stream function is (a sinh ky + b sinh my) sin kx e^{st}, m² = k² + s/ν: without shear at the floor and at the surface, and
-        with the pressure of the air plus 2ρν ∂v/∂y there.
+        The stream function is (a sinh ky + b sinh my) sin kx e^{st}, m² = k² + s/ν: without shear at the floor and at
+        the surface, and with the pressure of the air plus 2ρν ∂v/∂y there.
         """
         nu = self.kinematic_viscosity
 

@@ -30,7 +30,7 @@ class StillWater(FreeSurface):
 
     def domain(self) -> Domain:
         """Return the tank, whose top is open."""
-        return Domain([0, 0], [self.length, 2], [("slip", "slip"), ("slip", "none")])
+        return Domain([0, 0], [self.length, 2], [("slip", "slip"), ("slip", "air")])
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a lattice at rest with the hydrostatic pressure."""
@@ -40,7 +40,7 @@ class StillWater(FreeSurface):
         return self.fluid(position, np.zeros_like(position), 1 - position[:, 1])
 
     def measures(self, run: Record) -> list[Measure]:
-        """Return the largest velocity, how far the level has risen, and the error of the pressure, at the last snapshot."""
+        """Return the largest velocity, the rise of the level and the error of the pressure at the last snapshot."""
         if not len(run.times) or run.times[-1] <= 0:
             return []
         snapshot, source = run.snapshot(), "hydrostatics"

@@ -15,8 +15,9 @@ from alsph.geometry.points import checked_point, numbers
 from alsph.parameters import choose, suggest
 from alsph.text import shown
 
-Boundary = Literal["none", "slip", "periodic", "inlet", "outlet"]
-"""What closes a side: nothing (but solid particles beyond it), a free-slip wall, the opposite side, or open ends."""
+Boundary = Literal["none", "slip", "periodic", "inlet", "outlet", "air"]
+"""What closes a side: nothing (but solid particles beyond it), a free-slip wall, the opposite side, open ends, or
+the air beyond a free surface."""
 
 Made = TypeVar("Made", "Domain", "SolidBody")
 
@@ -31,7 +32,8 @@ class Domain:
         Its corners [D].
     boundaries : sequence of pairs
         What closes the lower and the upper side along x, y and in 3-D z: ``none``, where solid particles lie beyond
-        it, ``slip``, a free-slip wall, ``periodic``, both sides, ``inlet`` or ``outlet``, whose buffers lie outside.
+        it, ``slip``, a free-slip wall, ``periodic``, both sides, ``inlet`` or ``outlet``, whose buffers lie outside, or
+        ``air``, beyond a free surface: what crosses it is lost.
 
     Raises
     ------

@@ -210,8 +210,9 @@ def _values(snapshot: Snapshot, name: str, whole: Snapshot, spacing: float) -> F
 
 
 def _is_closed(snapshot: Snapshot) -> bool:
-    """Whether no fluid enters or leaves, so that the pressure is known but for a constant."""
-    return not np.isin(snapshot.kind, (Kind.INLET, Kind.OUTLET)).any()
+    """Whether no fluid enters or leaves nor meets the air, so that the pressure is known but for a constant."""
+    meets_air = snapshot.domain is not None and any("air" in sides for sides in snapshot.domain.boundaries)
+    return not meets_air and not np.isin(snapshot.kind, (Kind.INLET, Kind.OUTLET)).any()
 
 
 def extent_of(

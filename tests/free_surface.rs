@@ -1,0 +1,248 @@
+//! Fluids with a free surface: operators where the support of a particle is cut, what is found to be the surface, and what a step keeps.
+
+use alsph::base::Tensor;
+use alsph::discretisation::{AdjointGradient, ConservativeGradient, Divergence};
+use alsph::frame::{Frame, Travel};
+use alsph::settings::Settings;
+use alsph::surface::{Place, Surface};
+use alsph::{Clock, Matrix, ParticleKind, Particles, Simulation, Vector};
+use approx::assert_relative_eq;
+use proptest::prelude::*;
+use serde_json::json;
+
+mod common;
+
+const SPACING: f64 = 0.1;
+
+/// Settings of a box of side 4 with a free surface; gravity points down.
+fn settings<const D: usize>(sides: &str, gradient: &str) -> Settings {
+    let mut value = common::settings_value::<D>(SPACING, sides);
+    let mut force = vec![0.0; D];
+    force[D - 1] = -1.0;
+    let surface =
+        json!({"reference_velocity": 1, "pressure_gradient": gradient, "tension": false, "packing_relaxation": 0.05});
+    let others = json!({
+        "free_surface": surface, "body_force": force, "derivative_frame": "midpoint", "shifting": "none",
+        "wall_pressure": "linear", "penalty_constant": null, "courant": 0.2, "time_step": 1, "viscous_theta": 0.5,
+        "max_iterations": 2, "projection_sweeps": 4, "bodies": [],
+    });
+    common::set_all(&mut value, &others);
+    value["domain"]["upper"] = vec![4.0; D].into();
+    common::parse(&value)
+}
+
+/// A block of particles with its lowest corner at `corner`, each moved by up to `disorder` spacings.
+fn block<const D: usize>(corner: [f64; D], counts: [usize; D], disorder: f64, seed: u64) -> Vec<Vector<D>> {
+    let mut state = seed;
+    let mut random = move || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    let total = counts.iter().product::<usize>();
+    (0..total)
+        .map(|mut number| {
+            Vector::from_fn(|axis, _| {
+                let k = number % counts[axis];
+                number /= counts[axis];
+                corner[axis] + (k as f64 + 0.5 + 2.0 * disorder * random()) * SPACING
+            })
+        })
+        .collect()
+}
+
+fn fluid<const D: usize>(position: Vec<Vector<D>>, velocity: impl Fn(&Vector<D>) -> Vector<D>) -> Particles<D> {
+    let count = position.len();
+    Particles {
+        velocity: position.iter().map(velocity).collect(),
+        position,
+        pressure: vec![0.0; count],
+        kind: vec![ParticleKind::Fluid; count],
+        body: vec![0; count],
+        normal: vec![Vector::zeros(); count],
+        depth: vec![0.0; count],
+        id: (0..count as u64).collect(),
+        real: count,
+        ..Default::default()
+    }
+}
+
+fn found<const D: usize>(settings: &Settings, mut particles: Particles<D>) -> (Particles<D>, Frame<D>, Surface<D>) {
+    let (mut frame, mut surface) = (Frame::default(), Surface::default());
+    frame.search(settings, &mut particles, Travel::default(), false);
+    surface.find(settings, &particles, &mut frame);
+    (particles, frame, surface)
+}
+
+/// Σ V u·G*(q B) + Σ V q ∇·u, over what it is made of.
+fn adjointness<const D: usize>(settings: &Settings, position: Vec<Vector<D>>) -> f64 {
+    let wave = |x: &Vector<D>| Vector::from_fn(|k, _| (7.0 * x[k] + 3.0 * x.sum()).sin());
+    let (mut particles, frame, _) = found(settings, fluid(position, wave));
+    frame.images.fill(&mut particles.velocity);
+    let (real, count) = (particles.real, particles.len());
+    let q = |i: usize| (5.0 * particles.position[i].sum()).cos();
+    let mut tensor = vec![Tensor(Matrix::<D>::zeros()); count];
+    for i in 0..real {
+        tensor[i].0 = frame.stencil.correction[i].inverse * q(i);
+    }
+    frame.images.fill(&mut tensor);
+    let (mut pushed, mut taken) = (vec![0.0; real], vec![0.0; real]);
+    frame.stencil.for_each_one(AdjointGradient(&tensor), &mut pushed, |i, value, out| {
+        *out = value.dot(&particles.velocity[i]);
+    });
+    frame.stencil.for_each_one(Divergence(&particles.velocity), &mut taken, |i, value, out| *out = value * q(i));
+    let size: f64 = taken.iter().map(|value| value.abs()).sum();
+    (pushed.iter().sum::<f64>() + taken.iter().sum::<f64>()) / size
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+    /// Slopes are in single precision, but the same for both of a pair but for rounding.
+    #[test]
+    fn the_gradient_of_the_penalty_is_adjoint_to_the_divergence(seed in 0u64..1000, disorder in 0.0..0.25f64) {
+        for sides in ["air", "slip"] {
+            let corner = if sides == "air" { 1.0 } else { 0.0 };
+            let settings = settings::<2>(sides, "adjoint");
+            prop_assert!(adjointness(&settings, block([corner; 2], [14, 9], disorder, seed)).abs() < 1e-6);
+            let settings = self::settings::<3>(sides, "adjoint");
+            prop_assert!(adjointness(&settings, block([corner; 3], [6, 5, 7], disorder, seed)).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn forces_between_particles_cancel(seed in 0u64..1000) {
+        let settings = settings::<2>("air", "conservative");
+        let (particles, frame, _) = found(&settings, fluid(block([1.0; 2], [12, 8], 0.2, seed), |_| Vector::zeros()));
+        let pressure: Vec<f64> = particles.position.iter().map(|x| 1.0 + (3.0 * x.sum()).sin()).collect();
+        let mut force = vec![Vector::<2>::zeros(); particles.real];
+        frame.stencil.for_each_one(ConservativeGradient(&pressure), &mut force, |_, value, out| *out = value);
+        let size: f64 = force.iter().map(|f| f.norm()).sum();
+        let sum: Vector<2> = force.iter().sum();
+        let torque: f64 = force.iter().zip(&particles.position).map(|(f, x)| x[0] * f[1] - x[1] * f[0]).sum();
+        prop_assert!(sum.norm() < 1e-6 * size && torque.abs() < 1e-6 * size, "{sum} {torque} of {size}");
+    }
+}
+
+#[test]
+fn the_surface_is_the_outermost_row() {
+    let settings = settings::<2>("air", "adjoint");
+    let (particles, _, surface) = found(&settings, fluid(block([1.0; 2], [20, 16], 0.0, 0), |_| Vector::zeros()));
+    for (x, place) in particles.position.iter().zip(&surface.place) {
+        let rows = (0..2)
+            .map(|k| (x[k] - 1.0).min([2.0, 1.6][k] - (x[k] - 1.0)) / SPACING)
+            .fold(f64::INFINITY, f64::min)
+            .floor();
+        let expected = match rows as usize {
+            0 => Place::AtSurface,
+            1 | 2 => Place::Near,
+            _ => Place::Inside,
+        };
+        let seen = if rows == 2.0 && *place == Place::Inside { Place::Near } else { *place }; // nearly whole there
+        assert_eq!(seen, expected, "at {x}, row {rows}");
+    }
+    assert!(surface.weight.iter().all(|w| (0.0..=1.0).contains(w)));
+}
+
+#[test]
+fn the_surface_in_space_is_the_outermost_layer() {
+    let settings = settings::<3>("air", "adjoint");
+    let (particles, _, surface) = found(&settings, fluid(block([1.0; 3], [10, 11, 12], 0.0, 0), |_| Vector::zeros()));
+    let at_surface = |x: &Vector<3>| (0..3).any(|k| {
+        let row = ((x[k] - 1.0) / SPACING).floor() as usize;
+        row == 0 || row == [9, 10, 11][k]
+    });
+    for (x, place) in particles.position.iter().zip(&surface.place) {
+        assert_eq!(*place == Place::AtSurface, at_surface(x), "at {x}: {place:?}");
+    }
+}
+
+#[test]
+fn beside_a_slip_wall_is_no_surface() {
+    let settings = settings::<2>("slip", "adjoint");
+    let (particles, _, surface) = found(&settings, fluid(block([0.0; 2], [40, 10], 0.0, 0), |_| Vector::zeros()));
+    for (x, place) in particles.position.iter().zip(&surface.place) {
+        assert_eq!(*place == Place::AtSurface, x[1] > 0.9, "at {x}");
+    }
+}
+
+#[test]
+fn a_row_is_alone_and_three_are_not() {
+    let settings = settings::<2>("air", "adjoint");
+    let places = |rows| found(&settings, fluid(block([1.0; 2], [20, rows], 0.0, 0), |_| Vector::zeros())).2.place;
+    assert!(places(1).iter().all(|place| *place == Place::Isolated));
+    assert!(places(3)[20..40].iter().skip(2).take(16).all(|place| *place != Place::Isolated));
+}
+
+#[test]
+fn a_drop_falls_as_a_stone_does() {
+    for gradient in ["adjoint", "conservative"] {
+        let settings = settings::<2>("air", gradient);
+        let start = block([1.5, 2.5], [10, 10], 0.1, 3);
+        let thrown = Vector::<2>::new(0.3, 0.1);
+        let particles = fluid(start.clone(), |_| thrown);
+        let mut simulation = Simulation::new(settings, particles, Clock::default(), Some(1)).expect("settings");
+        simulation.advance(20, None).expect("steps");
+        let time = simulation.clock().time;
+        let particles = simulation.particles();
+        for i in 0..particles.real {
+            let from = start[particles.id[i] as usize];
+            let expected = from + thrown * time + Vector::<2>::new(0.0, -0.5 * time * time);
+            assert_relative_eq!(particles.position[i], expected, epsilon = 1e-6);
+            assert_relative_eq!(particles.velocity[i], thrown + Vector::<2>::new(0.0, -time), epsilon = 1e-5);
+        }
+    }
+}
+
+#[test]
+fn drops_that_meet_keep_their_momentum() {
+    for gradient in ["adjoint", "conservative"] {
+        let mut settings = settings::<2>("air", gradient);
+        settings.body_force = vec![0.0; 2];
+        let mut position = block([1.0, 2.0], [8, 8], 0.1, 3);
+        position.extend(block([1.85, 2.3], [8, 8], 0.1, 4));
+        let towards = |x: &Vector<2>| Vector::<2>::new(if x[0] < 1.82 { 1.0 } else { -1.0 }, 0.0);
+        let particles = fluid(position, towards);
+        let sums = |particles: &Particles<2>| {
+            let real = 0..particles.real;
+            let momentum: Vector<2> = real.clone().map(|i| particles.velocity[i]).sum();
+            let turn = |i: usize| {
+                let (x, u) = (particles.position[i], particles.velocity[i]);
+                x[0] * u[1] - x[1] * u[0]
+            };
+            (momentum, real.clone().map(turn).sum::<f64>(), real.map(|i| particles.velocity[i].norm_squared()).sum::<f64>())
+        };
+        let (momentum, turn, energy) = sums(&particles);
+        let mut simulation = Simulation::new(settings, particles, Clock::default(), Some(1)).expect("settings");
+        simulation.advance(60, None).expect("steps");
+        let (after, turned, left) = sums(simulation.particles());
+        assert!((after - momentum).norm() < 1e-4, "{gradient}: {after} from {momentum}");
+        assert!((turned - turn).abs() < 0.02 * 128.0 * 0.3, "{gradient}: {turned} from {turn}");
+        assert!(left < 0.9 * energy, "{gradient}: they do not meet: {left} of {energy}");
+    }
+}
+
+#[test]
+fn what_leaves_to_the_air_is_lost_and_counted() {
+    let settings = settings::<2>("air", "adjoint");
+    let particles = fluid(block([1.0, 0.05], [6, 6], 0.0, 0), |_| Vector::new(0.0, -1.0));
+    let mut simulation = Simulation::new(settings, particles, Clock::default(), Some(1)).expect("settings");
+    simulation.advance_until(0.4, None).expect("steps");
+    let left = simulation.particles().real;
+    assert!(left < 30, "{left} are left");
+    assert_relative_eq!(simulation.clock().mass_out, (36 - left) as f64 * SPACING * SPACING, max_relative = 1e-12);
+}
+
+#[test]
+fn what_does_not_go_with_a_free_surface_is_refused() {
+    for (name, value) in [
+        ("shifting", json!("strain")),
+        ("viscous_order", json!(4)),
+        ("derivative_frame", json!("updated")),
+        ("scheme", json!({"kind": "edac", "sound_speed": 10, "diffusion_coefficient": 0.5})),
+        ("free_surface", json!(null)),
+    ] {
+        let mut settings = serde_json::to_value(settings::<2>("air", "adjoint")).expect("JSON");
+        settings[name] = value;
+        let refused = Settings::from_json(&settings.to_string()).expect_err(name).to_string();
+        assert!(refused.contains(if name == "free_surface" { "air" } else { name }), "{refused}");
+    }
+}
