@@ -16,8 +16,12 @@ const CANDIDATE: f64 = 0.875;
 /// Below it, it is so whatever lies before it.
 const CERTAIN: f64 = 0.5;
 
-/// Below it, it has too few neighbours to be pushed by them: a row of particles has 0.21, two have 0.46.
-const ISOLATED: f64 = 0.35;
+/// Below it, it has too few neighbours for a pressure: in the plane a convex corner has 0.36, a row of particles 0.21, two rows have 0.47; in
+/// space a corner has 0.254, a row 0.06.
+const ISOLATED: [f64; 2] = [0.35, 0.25];
+
+/// So has a particle whose smallest eigenvalue is below it: a sheet in space has 0, a corner 0.16.
+const FLAT: f64 = 0.05;
 
 /// Above it, nothing of its support is cut.
 const WHOLE: f64 = 0.98;
@@ -37,7 +41,7 @@ pub enum Place {
     /// Its support is cut, and it has particles at the surface in it.
     Near,
     AtSurface,
-    /// It flies: no neighbour pushes it.
+    /// It has no pressure: it flies, but for what others push it with.
     Isolated,
 }
 
@@ -79,8 +83,13 @@ struct Found<const D: usize> {
 }
 
 impl<const D: usize> Poison for Found<D> {
-    const POISON: Self =
-        Self { trace: f64::NAN, least: f64::NAN, sum: f64::NAN, inverse: Tensor::<D>::POISON.0, first: <Vector<D> as Poison>::POISON };
+    const POISON: Self = Self {
+        trace: f64::NAN,
+        least: f64::NAN,
+        sum: f64::NAN,
+        inverse: Tensor::<D>::POISON.0,
+        first: <Vector<D> as Poison>::POISON,
+    };
 }
 
 impl<const D: usize> Surface<D> {
@@ -134,10 +143,10 @@ impl<const D: usize> Surface<D> {
             })
         };
         parallel::for_each(&mut self.place, |i, place| {
-            let Found { trace, .. } = found[i];
+            let Found { trace, least, .. } = found[i];
             *place = if particles.kind[i] != ParticleKind::Fluid {
                 Place::Inside
-            } else if trace < ISOLATED {
+            } else if trace < ISOLATED[D - 2] || least < FLAT {
                 Place::Isolated
             } else if trace < CERTAIN || (trace < CANDIDATE && cone_is_empty(i)) {
                 Place::AtSurface
@@ -155,17 +164,18 @@ impl<const D: usize> Surface<D> {
         let near = &self.near;
         self.weight.resize(real, 0.0);
         parallel::for_each(&mut self.place, |i, place| {
-            if *place == Place::Inside && particles.kind[i] == ParticleKind::Fluid && found[i].trace < WHOLE && near[i][1] > 0.0 {
+            if *place == Place::Inside
+                && particles.kind[i] == ParticleKind::Fluid
+                && found[i].trace < WHOLE
+                && near[i][1] > 0.0
+            {
                 *place = Place::Near;
             }
         });
         let place = &self.place;
         parallel::for_each(&mut self.weight, |i, weight| {
-            *weight = if place[i] == Place::Isolated {
-                0.0
-            } else {
-                1.0f64.min(found[i].least.powi(2)).min(near[i][0].powi(-2))
-            };
+            *weight =
+                if place[i] == Place::Isolated { 0.0 } else { 1.0f64.min(found[i].least.powi(2)).min(near[i][0].powi(-2)) };
         });
         self.missing.resize(real, 0.0);
         parallel::for_each(&mut self.missing, |i, missing| *missing = 2.0 * (sum - found[i].sum).max(0.0));

@@ -12,6 +12,8 @@ mod c_sides;
 mod d_sums;
 #[path = "breakdown.rs"]
 mod e_breakdown;
+#[path = "free_surface.rs"]
+mod f_free_surface;
 #[path = "interpolation.rs"]
 mod f_interpolation;
 #[path = "shift.rs"]

@@ -10,6 +10,7 @@ use alsph::neighbours::Grid;
 use alsph::scheme::{Alsph, Outcome, Scheme};
 use alsph::settings::{SweepPressure, SweepWeights, WallPressure};
 use alsph::shifting::shift;
+use alsph::surface::Surface;
 use alsph::{Clock, Matrix, ParticleKind, Particles, Settings, Simulation, Vector};
 use approx::assert_relative_eq;
 use common::set::Set;
@@ -263,7 +264,14 @@ fn with_buffers(particles: &mut Particles<2>) {
 
 fn first_flow(settings: &Settings, start: Particles<2>) -> Flow<2> {
     let Set { particles, frame } = first_frame(settings, start);
-    Flow { particles, frame, walls: Walls::new(settings), before: Before::default(), body_force: BodyForce::new(settings) }
+    Flow {
+        particles,
+        frame,
+        walls: Walls::new(settings),
+        before: Before::default(),
+        body_force: BodyForce::new(settings),
+        surface: Surface::default(),
+    }
 }
 
 /// Without viscosity a step changes the velocity by the gradient of the acting pressure, with sweeps and without, and says what
@@ -283,7 +291,7 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
         for _ in 0..2 {
             flow.remember();
             let solved = scheme.solve(step, &mut flow);
-            let Flow { particles, frame, walls, before, body_force } = flow;
+            let Flow { particles, frame, walls, before, body_force, surface } = flow;
             let acting: Vec<_> = (0..particles.len()).map(|i| scheme.acting_pressure(step, &particles, i)).collect();
             let seen = acting.iter().zip(&particles.pressure).any(|(acting, p)| (acting - p).abs() > 1e-3);
             assert!(seen, "nothing to be seen");
@@ -297,7 +305,7 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
             assert_relative_eq!(outcome.divergence_max, divergence.clone().fold(0.0, f64::max), epsilon = 1e-12);
             assert_relative_eq!(outcome.divergence_sum, divergence.sum::<f64>(), max_relative = 1e-9);
             let Set { particles, frame } = set;
-            flow = Flow { particles, frame, walls, before, body_force };
+            flow = Flow { particles, frame, walls, before, body_force, surface };
         }
     }
 }

@@ -17,6 +17,7 @@ FLOORS = (
     ("halo", "neighbours"),
     ("discretisation", "faces"),
     ("frame",),
+    ("surface",),
     ("forcing",),
     ("boundary", "breakdown", "interpolation"),
     ("flow", "poisson"),

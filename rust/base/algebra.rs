@@ -13,7 +13,10 @@ pub fn symmetric_eigen<const D: usize>(matrix: &Matrix<D>) -> (Vector<D>, Matrix
     macro_rules! of {
         ($Fixed:ty) => {{
             let eigen = <$Fixed>::from_column_slice(matrix.as_slice()).symmetric_eigen();
-            (Vector::from_column_slice(eigen.eigenvalues.as_slice()), Matrix::from_column_slice(eigen.eigenvectors.as_slice()))
+            (
+                Vector::from_column_slice(eigen.eigenvalues.as_slice()),
+                Matrix::from_column_slice(eigen.eigenvectors.as_slice()),
+            )
         }};
     }
     match D {

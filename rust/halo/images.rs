@@ -7,8 +7,8 @@
 //! [`Images::real`], and begin what they form anew with [`Images::blank`]: with [`Images::poisons`] what is stale is NaN, which shows
 //! whatever reads it.
 
-use crate::base::{Matrix, Tensor, Vector};
 use crate::base::parallel;
+use crate::base::{Matrix, Tensor, Vector};
 use crate::halo::Poison;
 use crate::particles::Particles;
 use crate::settings::{Boundary, Domain};

@@ -195,7 +195,7 @@ impl<const D: usize> SurfaceAlsph<D> {
     }
 
     fn correct_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
-        let Flow { particles, frame, body_force, surface, .. } = flow;
+        let Flow { particles, frame, body_force, .. } = flow;
         if self.own.pressure_gradient == PressureGradient::Adjoint {
             frame.images.blank(&mut self.tensor, particles.len());
             parallel::for_each(frame.images.real(&mut self.tensor), |i, tensor| {
@@ -206,13 +206,12 @@ impl<const D: usize> SurfaceAlsph<D> {
             parallel::for_each(&mut self.tensor, |i, tensor| tensor.0 *= particles.pressure[i]);
         }
         let Particles { kind, position, pressure, velocity, .. } = particles;
-        let (star, place) = (&self.velocity_star, &surface.place);
+        let star = &self.velocity_star;
         let condition = conditions(step.settings);
         let (dt, density) = (step.time_step, step.settings.density);
         let correct = |i: usize, gradient: Vector<D>, u: &mut Vector<D>| {
             if condition(kind[i], &position[i]).velocity == VelocityRule::Solved {
-                let push = if place[i] == Place::Isolated { Vector::zeros() } else { gradient / density };
-                *u = star[i] + (body_force.at(i) - push) * dt;
+                *u = star[i] + (body_force.at(i) - gradient / density) * dt;
             }
         };
         let real = frame.images.real(velocity);
@@ -243,11 +242,10 @@ impl<const D: usize> SurfaceAlsph<D> {
             let Flow { particles, frame, surface, .. } = &mut *flow;
             let condition = conditions(step.settings);
             let Particles { kind, position, pressure, velocity, .. } = particles;
-            let (divergence, weight, place, tension) =
-                (&self.divergence, &surface.weight, &surface.place, self.own.tension);
+            let (divergence, weight, tension) = (&self.divergence, &surface.weight, self.own.tension);
             let (real_pressure, real_velocity) = (frame.images.real(pressure), frame.images.real(velocity));
             frame.stencil.for_each(AdjointGradient(&self.tensor), real_velocity, real_pressure, |i, gradient, u, p| {
-                if condition(kind[i], &position[i]).velocity == VelocityRule::Solved && place[i] != Place::Isolated {
+                if condition(kind[i], &position[i]).velocity == VelocityRule::Solved {
                     *u += gradient * relaxation;
                     *p -= factor * weight[i] * divergence[i];
                     if !tension {

@@ -38,7 +38,10 @@ impl Settings {
     pub fn lattice_sums(&self) -> (f64, f64) {
         let (slopes, _) = self.lattice_slopes();
         let distance = |r: &[f64; 3]| r.iter().map(|x| x * x).sum::<f64>().sqrt();
-        (-slopes.iter().map(|(_, slope)| slope).sum::<f64>(), -slopes.iter().map(|(r, slope)| slope * distance(r)).sum::<f64>())
+        (
+            -slopes.iter().map(|(_, slope)| slope).sum::<f64>(),
+            -slopes.iter().map(|(r, slope)| slope * distance(r)).sum::<f64>(),
+        )
     }
 
     /// The same of −∇·∇, the divergence of the gradient: three to five times smaller, since both operators miss short waves.

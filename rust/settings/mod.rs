@@ -14,8 +14,8 @@ pub use domain::{Body, Boundary, Domain};
 pub use lattice::Eigenvalues;
 pub use limits::TimeStepLimits;
 pub use rules::{
-    DensityDiffusion, DerivativeFrame, FreeSurface, PressureGradient, ProjectionSettings, SchemeSettings, Shifting, Solver, SweepPressure, SweepWeights,
-    VelocityLaplacian, WallPressure, WallVelocity,
+    DensityDiffusion, DerivativeFrame, FreeSurface, PressureGradient, ProjectionSettings, SchemeSettings, Shifting, Solver,
+    SweepPressure, SweepWeights, VelocityLaplacian, WallPressure, WallVelocity,
 };
 
 /// Iterations or sweeps of a step above which a number is a mistake: a step cannot be interrupted.
@@ -183,7 +183,10 @@ impl Settings {
         let has = |sides: [Boundary; 2]| self.domain.boundaries.iter().flatten().any(|side| sides.contains(side));
         let Some(surface) = self.free_surface else {
             if has([Boundary::Air; 2]) {
-                return Err(setting("domain.boundaries", "air lies beyond a free surface alone, which `free_surface` tells of"));
+                return Err(setting(
+                    "domain.boundaries",
+                    "air lies beyond a free surface alone, which `free_surface` tells of",
+                ));
             }
             return Ok(());
         };
