@@ -17,8 +17,13 @@ FIELDS = {
     "body_3d": "velocity",
     "backward_facing_step": "velocity",
     "cavity": "velocity",
+    "dam_break": "pressure",
+    "elliptical_drop": "pressure",
     "nozzle": "velocity",
     "pressure_jump": "pressure",
+    "rotating_patch": "pressure",
+    "standing_wave": "velocity",
+    "still_water": "pressure",
     "taylor_green": "vorticity",
 }
 """The field of those pictures that show neither a profile nor the vorticity past a body."""

@@ -79,7 +79,7 @@ def test_engine_accepts_the_settings_and_the_estimate_is_close(model):
     limits = _alsph.time_step_limits(json.dumps(case.replace(penalty_constant=100.0).settings()), 1.0)
     assert 0.09 < limits["penalty"] / case.particle_spacing < 0.1 and limits["courant"] == np.inf
     limits = _alsph.time_step_limits(json.dumps(case.settings()), 1.0)
-    assert limits["courant"] / case.particle_spacing == pytest.approx(0.3) and limits["penalty"] == np.inf
+    assert limits["courant"] / case.particle_spacing == pytest.approx(case.courant) and limits["penalty"] == np.inf
     assert case.particle_estimate() == pytest.approx(len(case.particles()["kind"]), rel=0.02)
 
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from alsph import reference
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.free_surface import FreeSurface
+from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_centres, lattice
 
@@ -40,6 +41,14 @@ class DamBreak(FreeSurface):
     packing_relaxation: float = Field(
         default=0.05, ge=0, le=1, description="share of a number density above the lattice's that a step takes off [-]"
     )
+
+    @model_validator(mode="after")
+    def _the_tank_holds_the_column(self) -> Self:
+        if self.length >= self.tank_length:
+            raise ConfigError(
+                f"length = {self.length:g}: the column does not fit into a tank_length of {self.tank_length:g}"
+            )
+        return self
 
     @property
     def default_until(self) -> float:

@@ -7,7 +7,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy.optimize import curve_fit, newton
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
@@ -56,6 +55,8 @@ class StandingWave(FreeSurface):
         The stream function is (a sinh ky + b sinh my) sin kx e^{st}, m² = k² + s/ν: without shear at the floor and at
         the surface, and with the pressure of the air plus 2ρν ∂v/∂y there.
         """
+        from scipy.optimize import newton  # half a second that most commands do without
+
         nu = self.kinematic_viscosity
 
         def balance(s: complex) -> complex:
@@ -68,6 +69,8 @@ class StandingWave(FreeSurface):
 
     def measures(self, run: Record) -> list[Measure]:
         """Return frequency and decay rate, from the kinetic energy, and what energy was made."""
+        from scipy.optimize import curve_fit
+
         time, energy = run.history.get("time", np.empty(0)), run.history.get("kinetic_energy", np.empty(0))
         exact, rows = self.growth(), self.energy_measures(run)
         if len(time) < 2 or time[-1] < 1.5 * np.pi / exact.imag:
