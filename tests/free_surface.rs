@@ -198,6 +198,7 @@ fn drops_that_meet_keep_their_momentum() {
     for gradient in ["adjoint", "conservative"] {
         let mut settings = settings::<2>("air", gradient);
         settings.body_force = vec![0.0; 2];
+        settings.kinematic_viscosity = 1e-12;
         let mut position = block([1.0, 2.0], [8, 8], 0.1, 3);
         position.extend(block([1.85, 2.3], [8, 8], 0.1, 4));
         let towards = |x: &Vector<2>| Vector::<2>::new(if x[0] < 1.82 { 1.0 } else { -1.0 }, 0.0);

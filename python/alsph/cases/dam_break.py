@@ -45,9 +45,7 @@ class DamBreak(FreeSurface):
     @model_validator(mode="after")
     def _the_tank_holds_the_column(self) -> Self:
         if self.length >= self.tank_length:
-            raise ConfigError(
-                f"length = {self.length:g}: the column does not fit into a tank_length of {self.tank_length:g}"
-            )
+            raise ConfigError(f"length = {self.length:g}: does not fit into a tank_length of {self.tank_length:g}")
         return self
 
     @property

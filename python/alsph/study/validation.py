@@ -91,6 +91,9 @@ QUICK = (
     Entry("taylor_couette", (20,), until=1.0),
     Entry("pulsating_channel", (20, 40), until=1.6),
     Entry("backward_facing_step", (10,), until=40.0, parameters={"reynolds": 100, "downstream": 8.0}),
+    Entry("dam_break", (20, 40), until=2.0),
+    Entry("standing_wave", (20, 30), until=10.0),
+    Entry("elliptical_drop", (10, 20), until=0.8),
 )
 FULL = (
     Entry("taylor_green", (25, 50, 100), until=1.0),
@@ -102,6 +105,13 @@ FULL = (
     Entry("nozzle", (10, 20), until=20.0),
     Entry("bend", (10, 20), until=20.0),
     Entry("taylor_couette", (10, 20, 40), until=1.0),
+    Entry("dam_break", (20, 40, 80), until=2.0),
+    Entry("still_water", (20, 40), until=10.0),
+    Entry("standing_wave", (20, 40), until=10.0, parameters={"reynolds": 50}),
+    Entry("standing_wave", (20, 40), until=10.0),
+    Entry("standing_wave", (20, 40, 80), until=10.0, parameters={"reynolds": 2500}),
+    Entry("elliptical_drop", (10, 20, 40), until=0.8),
+    Entry("rotating_patch", (20, 40), until=2.0),
     Entry("cavity", (25, 50, 100), until=24.0, parameters={"reynolds": 100}, continued=12.0),
     Entry("cavity", (50, 100), until=36.0, parameters={"reynolds": 400}, continued=18.0),
     Entry("cavity", (50, 100, 150), until=60.0, parameters={"reynolds": 1000}, continued=24.0),
