@@ -27,7 +27,7 @@ use crate::settings::{Eigenvalues, Settings, SweepPressure, SweepWeights};
 
 /// κ: the share of a sweep's potential that the pressure keeps. The rest of it is mostly noise of the one step; all of the
 /// pressure comes in over a few steps.
-pub(super) const PRESSURE_SHARE: f64 = 0.5;
+const PRESSURE_SHARE: f64 = 0.5;
 
 /// a: the smallest eigenvalue that the polynomial of Chebyshev looks to, over the largest. With a tenth four sweeps go so far that
 /// disordered particles leave more ∇·u, not less.

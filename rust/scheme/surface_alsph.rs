@@ -16,7 +16,7 @@ use crate::boundary::{VelocityRule, conditions, extend_pressure, extrapolate_sca
 use crate::discretisation::{AdjointGradient, ConservativeGradient, Divergence, LaplacianAndGradient, LaplacianAndItsSum};
 use crate::flow::{Flow, Step};
 use crate::particles::{ParticleKind, Particles};
-use crate::scheme::projection::{EIGENVALUE_MARGIN, PRESSURE_SHARE, weight};
+use crate::scheme::projection::{EIGENVALUE_MARGIN, weight};
 use crate::scheme::{Derived, Scheme, Solved};
 use crate::settings::{Eigenvalues, FreeSurface, PressureGradient, Settings, TimeStepLimits};
 use crate::surface::{Place, Surface};
@@ -236,7 +236,7 @@ impl<const D: usize> SurfaceAlsph<D> {
         let relaxation = area / (EIGENVALUE_MARGIN * self.largest.projection);
         for sweep in 0..step.settings.projection_sweeps {
             let relaxation = relaxation / weight(step.settings, sweep);
-            let factor = PRESSURE_SHARE * step.settings.density * relaxation / step.time_step;
+            let factor = step.settings.density * relaxation / step.time_step;
             self.measure_divergence(flow);
             self.form_tensor(step, flow);
             let Flow { particles, frame, surface, .. } = &mut *flow;
