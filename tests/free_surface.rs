@@ -87,7 +87,7 @@ fn adjointness<const D: usize>(settings: &Settings, position: Vec<Vector<D>>) ->
     }
     frame.images.fill(&mut tensor);
     let (mut pushed, mut taken) = (vec![0.0; real], vec![0.0; real]);
-    frame.stencil.for_each_one(AdjointGradient(&tensor), &mut pushed, |i, value, out| {
+    frame.stencil.for_each_one(AdjointGradient { tensor: &tensor, own: |_| 1.0 }, &mut pushed, |i, value, out| {
         *out = value.dot(&particles.velocity[i]);
     });
     frame.stencil.for_each_one(Divergence(&particles.velocity), &mut taken, |i, value, out| *out = value * q(i));
@@ -115,7 +115,7 @@ proptest! {
         let (particles, frame, _) = found(&settings, fluid(block([1.0; 2], [12, 8], 0.2, seed), |_| Vector::zeros()));
         let pressure: Vec<f64> = particles.position.iter().map(|x| 1.0 + (3.0 * x.sum()).sin()).collect();
         let mut force = vec![Vector::<2>::zeros(); particles.real];
-        frame.stencil.for_each_one(ConservativeGradient(&pressure), &mut force, |_, value, out| *out = value);
+        frame.stencil.for_each_one(ConservativeGradient { pressure: &pressure, own: |_| 1.0 }, &mut force, |_, value, out| *out = value);
         let size: f64 = force.iter().map(|f| f.norm()).sum();
         let sum: Vector<2> = force.iter().sum();
         let torque: f64 = force.iter().zip(&particles.position).map(|(f, x)| x[0] * f[1] - x[1] * f[0]).sum();

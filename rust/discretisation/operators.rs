@@ -27,11 +27,19 @@ pub struct Laplacian<'a>(pub &'a [f64]);
 pub struct LaplacianDiagonal;
 
 /// Σ slope (f_i + f_j) r_ij: what particles push each other with that carry the pressures f, in opposite directions.
-pub struct ConservativeGradient<'a>(pub &'a [f64]);
+pub struct ConservativeGradient<'a, F> {
+    pub pressure: &'a [f64],
+    /// What a particle's own counts in its sum: 1, or −1 where the sum is to be that of differences.
+    pub own: F,
+}
 
 /// Σ slope (M_i + M_j) r_ij of a field of symmetric matrices: with M = q α⁻¹ and equal volumes it is minus the adjoint of [`Divergence`],
 /// Σ u·(of M) = −Σ q ∇·u, and a gradient of q where neighbours are evenly spread.
-pub struct AdjointGradient<'a, const D: usize>(pub &'a [Tensor<D>]);
+pub struct AdjointGradient<'a, const D: usize, F> {
+    pub tensor: &'a [Tensor<D>],
+    /// As of [`ConservativeGradient`].
+    pub own: F,
+}
 
 /// ∇²f as [`Laplacian`], and −2 Σ slope (f_i − f_j) without a correction.
 pub struct LaplacianAndItsSum<'a>(pub &'a [f64]);
@@ -67,22 +75,22 @@ impl<const D: usize> Operator<D> for Gradient<'_> {
     }
 }
 
-impl<const D: usize> Operator<D> for ConservativeGradient<'_> {
+impl<const D: usize, F: Fn(usize) -> f64 + Sync> Operator<D> for ConservativeGradient<'_, F> {
     type Value = Vector<D>;
 
     #[inline(always)]
     fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [Vector<D>; LANES] {
-        let here: V = near.cluster().lanes(|i| self.0[i]);
+        let here: V = near.cluster().lanes(|i| self.pressure[i] * (self.own)(i));
         let mut gradient = [V::zero(); D];
         near.for_each(
             #[inline(always)]
-            |j, slope: V, r_ij| add_product(&mut gradient, (V::splat(self.0[j]) + here) * slope, r_ij),
+            |j, slope: V, r_ij| add_product(&mut gradient, (V::splat(self.pressure[j]) + here) * slope, r_ij),
         );
         vectors(gradient)
     }
 }
 
-impl<const D: usize> Operator<D> for AdjointGradient<'_, D> {
+impl<const D: usize, F: Fn(usize) -> f64 + Sync> Operator<D> for AdjointGradient<'_, D, F> {
     type Value = Vector<D>;
 
     #[inline(always)]
@@ -91,14 +99,14 @@ impl<const D: usize> Operator<D> for AdjointGradient<'_, D> {
         let mut here = [[V::zero(); D]; D];
         for k in 0..D {
             for l in 0..D {
-                here[k][l] = cluster.lanes(|i| self.0[i].0[(k, l)]);
+                here[k][l] = cluster.lanes(|i| self.tensor[i].0[(k, l)] * (self.own)(i));
             }
         }
         let mut gradient = [V::zero(); D];
         near.for_each(
             #[inline(always)]
             |j, slope: V, r_ij| {
-                let there = &self.0[j].0;
+                let there = &self.tensor[j].0;
                 for k in 0..D {
                     let mut sum = V::zero();
                     for l in 0..D {

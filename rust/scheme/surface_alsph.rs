@@ -112,11 +112,15 @@ impl<const D: usize> SurfaceAlsph<D> {
             tensor.0 = strain_rate[i].0 * frame.stencil.correction[i].inverse * 2.0;
         });
         frame.images.fill(&mut self.tensor);
-        frame.stencil.for_each_one(AdjointGradient(&self.tensor), &mut self.derived, |i, value, derived| {
-            if surface.place[i].sees_air() {
-                derived.laplacian = value;
-            }
-        });
+        frame.stencil.for_each_one(
+            AdjointGradient { tensor: &self.tensor, own: |_| 1.0 },
+            &mut self.derived,
+            |i, value, derived| {
+                if surface.place[i].sees_air() {
+                    derived.laplacian = value;
+                }
+            },
+        );
     }
 
     /// w q B of all particles, from the divergence of the fluid.
@@ -151,7 +155,7 @@ impl<const D: usize> SurfaceAlsph<D> {
         frame.images.blank(&mut self.velocity_star, particles.len());
         let derived = &self.derived;
         frame.stencil.for_each_one(
-            AdjointGradient(&self.tensor),
+            AdjointGradient { tensor: &self.tensor, own: |_| 1.0 },
             frame.images.real(&mut self.velocity_star),
             |i, gradient, star| {
                 *star = before.velocity[i];
@@ -195,7 +199,7 @@ impl<const D: usize> SurfaceAlsph<D> {
     }
 
     fn correct_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
-        let Flow { particles, frame, body_force, .. } = flow;
+        let Flow { particles, frame, body_force, surface, .. } = flow;
         if self.own.pressure_gradient == PressureGradient::Adjoint {
             frame.images.blank(&mut self.tensor, particles.len());
             parallel::for_each(frame.images.real(&mut self.tensor), |i, tensor| {
@@ -214,10 +218,18 @@ impl<const D: usize> SurfaceAlsph<D> {
                 *u = star[i] + (body_force.at(i) - gradient / density) * dt;
             }
         };
+        let place = &surface.place;
+        // Antisymmetric forces draw particles together that carry a pressure below that of the air, until voids open between them (Swegle,
+        // Hicks and Attaway 1995); differences do not (Sun et al. 2018).
+        let own = |i: usize| if pressure[i] < 0.0 && place[i] == Place::Inside { -1.0 } else { 1.0 };
         let real = frame.images.real(velocity);
         match self.own.pressure_gradient {
-            PressureGradient::Conservative => frame.stencil.for_each_one(ConservativeGradient(pressure), real, correct),
-            PressureGradient::Adjoint => frame.stencil.for_each_one(AdjointGradient(&self.tensor), real, correct),
+            PressureGradient::Conservative => {
+                frame.stencil.for_each_one(ConservativeGradient { pressure, own }, real, correct)
+            }
+            PressureGradient::Adjoint => {
+                frame.stencil.for_each_one(AdjointGradient { tensor: &self.tensor, own }, real, correct)
+            }
         }
         frame.images.fill(velocity);
     }
@@ -244,15 +256,20 @@ impl<const D: usize> SurfaceAlsph<D> {
             let Particles { kind, position, pressure, velocity, .. } = particles;
             let (divergence, weight, tension) = (&self.divergence, &surface.weight, self.own.tension);
             let (real_pressure, real_velocity) = (frame.images.real(pressure), frame.images.real(velocity));
-            frame.stencil.for_each(AdjointGradient(&self.tensor), real_velocity, real_pressure, |i, gradient, u, p| {
-                if condition(kind[i], &position[i]).velocity == VelocityRule::Solved {
-                    *u += gradient * relaxation;
-                    *p -= factor * weight[i] * divergence[i];
-                    if !tension {
-                        *p = p.max(0.0);
+            frame.stencil.for_each(
+                AdjointGradient { tensor: &self.tensor, own: |_| 1.0 },
+                real_velocity,
+                real_pressure,
+                |i, gradient, u, p| {
+                    if condition(kind[i], &position[i]).velocity == VelocityRule::Solved {
+                        *u += gradient * relaxation;
+                        *p -= factor * weight[i] * divergence[i];
+                        if !tension {
+                            *p = p.max(0.0);
+                        }
                     }
-                }
-            });
+                },
+            );
             frame.images.fill(velocity);
         }
         self.extend_pressure(step, flow);
