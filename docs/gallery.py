@@ -21,6 +21,7 @@ FIELDS = {
     "elliptical_drop": "pressure",
     "nozzle": "velocity",
     "pressure_jump": "pressure",
+    "sloshing": "pressure",
     "rotating_patch": "pressure",
     "standing_wave": "velocity",
     "still_water": "pressure",

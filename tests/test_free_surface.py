@@ -1,5 +1,6 @@
 """Cases with a free surface, beside their references."""
 
+import alsph
 import numpy as np
 import pytest
 from alsph import cases, reference
@@ -69,6 +70,45 @@ def test_linear_theory_of_waves_is_that_of_an_independent_computation():
     for reynolds, (decay, frequency) in known.items():
         growth = cases.StandingWave(reynolds=reynolds).growth()
         assert (-growth.real, growth.imag) == pytest.approx((decay, frequency), rel=1e-6)
+
+
+def test_linear_theory_of_a_tank_that_sways_is_that_of_an_independent_computation():
+    """A tank of length 1 with 0.35 of water, below and above its first frequency: elevation at its far end over A."""
+    for share, known in ((0.8, {5: -1.34587, 20: 0.08783}), (1.2, {5: 4.16472, 20: 0.37214})):
+        case = cases.Sloshing(
+            resolution=140,
+            length=1 / 0.35,
+            amplitude=1e-3 / 0.35,
+            frequency=share * 1.58566776 * np.sqrt(0.35),
+            phase=90,
+        )
+        times = np.array(list(known)) / np.sqrt(0.35)
+        level = case.linear_level(times, case.length) * 0.35 / 1e-3
+        assert level == pytest.approx(list(known.values()), abs=0.02)
+
+
+def test_a_tank_that_sways_a_little_has_the_level_of_linear_theory(tmp_path):
+    case = cases.Sloshing(amplitude=0.003, frequency=0.75, phase=90, gauge=0)
+    run = case.run(tmp_path / "run", until=20.0, progress=False)
+    (measure,) = run.measures
+    assert measure.passed, measure
+    (profile,) = run.profiles
+    assert len(profile.computed[0]) == len(profile.reference[0]) == 400
+
+
+def test_gauges_tell_the_depth_of_a_lattice():
+    case = cases.StillWater(resolution=20)
+    levels = cases.free_surface.Levels([0.0, 0.3, 0.5, 1.0], 1.0, case.particle_spacing)
+    assert levels.depth(case.particles()["position"]) == pytest.approx(1, rel=1e-12)
+
+
+def test_levels_of_a_run_that_is_cut_are_those_of_a_whole_one(tmp_path):
+    case = cases.Sloshing(resolution=10)
+    case.run(tmp_path / "whole", until=1.0, progress=False)
+    case.run(tmp_path / "cut", until=0.5, progress=False)
+    alsph.resume(tmp_path / "cut", until=1.0, progress=False)
+    texts = [(tmp_path / name / "output_levels.csv").read_text() for name in ("whole", "cut")]
+    assert texts[0] == texts[1] and len(texts[0].splitlines()) >= 20
 
 
 def test_first_pressure_of_a_dam_break():

@@ -35,6 +35,7 @@ from alsph.cases.poiseuille import Poiseuille
 from alsph.cases.pressure_jump import PressureJump
 from alsph.cases.pulsating_channel import PulsatingChannel
 from alsph.cases.rotating_patch import RotatingPatch
+from alsph.cases.sloshing import Sloshing
 from alsph.cases.spatial import Spatial
 from alsph.cases.sphere import Sphere
 from alsph.cases.standing_wave import StandingWave
@@ -50,7 +51,7 @@ CASES: dict[str, type[Case]] = {
     for case in (
         *(Cylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Nozzle, Bend, Cavity),
         *(Poiseuille, Couette, TaylorCouette, PulsatingChannel, Pipe, PressureJump, TaylorGreen),
-        *(DamBreak, StandingWave, StillWater, EllipticalDrop, RotatingPatch),
+        *(DamBreak, StandingWave, StillWater, Sloshing, EllipticalDrop, RotatingPatch),
     )
 }
 
@@ -77,6 +78,7 @@ __all__ = [
     "PressureJump",
     "PulsatingChannel",
     "RotatingPatch",
+    "Sloshing",
     "SolidBody",
     "Spatial",
     "Sphere",

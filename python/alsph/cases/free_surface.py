@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -12,10 +14,71 @@ from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
+from alsph.engine.simulation import Simulation
+from alsph.folder.durable import write_text
 from alsph.geometry.particles import Kind, particles
 
 COURANT = 0.2
 """Courant number of a step where none is given: the shortest waves of the surface are those of gravity."""
+
+
+class Levels:
+    """The depth of the water at gauges over time, in a file of the run folder.
+
+    It is what lies in a column around the gauge, over its width: spray counts as what it is, and the level is smooth.
+
+    Parameters
+    ----------
+    gauges
+        Their places along x [H].
+    length
+        Length of the tank, from x = 0 [H].
+    spacing
+        Particle spacing Δx [H].
+    """
+
+    file = "output_levels.csv"
+    interval = 0.05
+
+    def __init__(self, gauges: Sequence[float], length: float, spacing: float) -> None:
+        self.gauges, self.length, self.spacing = gauges, length, spacing
+        self.rows: list[str] = []
+
+    def depth(self, position: FloatArray) -> FloatArray:
+        """Return the depth (m,) at the gauges of fluid particles at positions (n, 2).
+
+        The column reaches four spacings to each side and ends softly; beyond a wall it goes on as in a mirror.
+        """
+        x = np.concatenate([position[:, 0], -position[:, 0], 2 * self.length - position[:, 0]])
+        share = np.abs(x - np.array(self.gauges, float)[:, None]) / (4 * self.spacing)
+        weight = np.where(share < 1, 1 + np.cos(np.pi * share), 0.0)
+        return np.asarray(weight.sum(axis=1) * self.spacing / 8)
+
+    def record(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> None:
+        """Keep the present depths."""
+        depths = self.depth(simulation.state()["position"])
+        self.rows.append(",".join(f"{value:.9g}" for value in (simulation.time, *depths)) + "\n")
+
+    def append(self, path: Path) -> None:
+        """Append them to the file."""
+        with path.open("a", encoding="ascii") as file:
+            file.writelines(self.rows)
+        self.rows = []
+
+    def truncate(self, path: Path, time: float) -> None:
+        """Drop what is later than `time`."""
+        lines = path.read_text(encoding="ascii").splitlines(keepends=True)
+        whole = [line for line in lines if line.endswith("\n")]
+        write_text(path, "".join(line for line in whole if float(line.split(",")[0]) <= time))
+
+    @classmethod
+    def read(cls, run: Record) -> tuple[FloatArray, FloatArray]:
+        """Return times (k,) and depths (m, k) of a run [√(H/g), H]; none where there is no file."""
+        path = run.path / cls.file
+        if not path.exists() or not path.stat().st_size:
+            return np.empty(0), np.empty((1, 0))
+        table = np.loadtxt(path, delimiter=",", ndmin=2).T
+        return table[0], table[1:]
 
 
 class FreeSurface(Case):
