@@ -15,7 +15,6 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
 from alsph.engine.simulation import Simulation
-from alsph.folder.durable import write_text
 from alsph.geometry.particles import Kind, particles
 
 COURANT = 0.2
@@ -69,7 +68,9 @@ class Levels:
         """Drop what is later than `time`."""
         lines = path.read_text(encoding="ascii").splitlines(keepends=True)
         whole = [line for line in lines if line.endswith("\n")]
-        write_text(path, "".join(line for line in whole if float(line.split(",")[0]) <= time))
+        new = path.with_suffix(".new")
+        new.write_text("".join(line for line in whole if float(line.split(",")[0]) <= time), encoding="ascii")
+        new.replace(path)
 
     @classmethod
     def read(cls, run: Record) -> tuple[FloatArray, FloatArray]:
