@@ -13,6 +13,7 @@ SURFACES = [model for model in cases.CASES.values() if issubclass(model, cases.F
     ("name", "parameters"),
     [
         ("dam_break", {"resolution": 40}),
+        ("dam_break", {"resolution": 14, "dimensions": 3}),
         ("standing_wave", {"resolution": 30, "reynolds": 200}),
         ("elliptical_drop", {"resolution": 20}),
         ("rotating_patch", {"resolution": 30}),
@@ -45,10 +46,11 @@ def test_a_dam_breaks_to_the_end_without_making_energy(seed, gradient):
     assert rows["packing_max"][-1] < 2
 
 
-@pytest.mark.parametrize("model", SURFACES)
-def test_a_run_that_is_restored_has_the_bits_of_a_whole_one(model):
+@pytest.mark.parametrize(
+    "case", [*(model(resolution=12) for model in SURFACES), cases.DamBreak(resolution=8, dimensions=3)]
+)
+def test_a_run_that_is_restored_has_the_bits_of_a_whole_one(case):
     """On other numbers of threads, and stored in another order."""
-    case = model(resolution=12)
     whole, first = case.simulation(threads=1), case.simulation(threads=2)
     whole.advance(40)
     first.advance(17)

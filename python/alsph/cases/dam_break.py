@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.free_surface import FreeSurface
 from alsph.errors import ConfigError
-from alsph.geometry.domain import Domain
+from alsph.geometry.domain import Boundary, Domain
 from alsph.geometry.lattice import cell_centres, lattice
 
 FRONT = {1.0: 2.947, 2.0: 4.665}
@@ -38,6 +38,8 @@ class DamBreak(FreeSurface):
     length: float = Field(default=2.0, gt=0, description="length of the column [H]")
     tank_length: float = Field(default=5.366, gt=0, description="length of the tank [H]")
     tank_height: float = Field(default=3.0, gt=1, description="height above which spray is lost [H]")
+    dimensions: Literal[2, 3] = Field(default=2, description="number of space dimensions")
+    width: float = Field(default=0.5, gt=0, description="width of column and tank in 3-D [H]")
     packing_relaxation: float = Field(
         default=0.05, ge=0, le=1, description="share of a number density above the lattice's that a step takes off [-]"
     )
@@ -53,16 +55,30 @@ class DamBreak(FreeSurface):
         """Until the front is near the far wall."""
         return 2.0
 
+    @property
+    def space_dimensions(self) -> int:
+        """2 or 3, as the parameter `dimensions` says."""
+        return self.dimensions
+
     def domain(self) -> Domain:
         """Return the tank, whose top is open."""
-        return Domain([0, 0], [self.tank_length, self.tank_height], [("slip", "slip"), ("slip", "air")])
+        across = [self.width] if self.dimensions == 3 else []
+        lengths = [self.tank_length, *across, self.tank_height]
+        sides: list[tuple[Boundary, Boundary]] = [("slip", "slip")] * len(lengths)
+        sides[-1] = ("slip", "air")
+        return Domain([0] * len(lengths), lengths, sides)
+
+    @property
+    def middle(self) -> FloatArray:
+        """Point that slices for pictures go through in 3-D [H]: in the water, as long as there is some."""
+        return np.array([self.tank_length / 2, self.width / 2, 0.05])
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return the column at rest, with the pressure of its first instant."""
-        columns = self.whole_cells("length", self.length)
-        position = lattice(
-            cell_centres(columns, self.particle_spacing), cell_centres(self.resolution, self.particle_spacing)
-        )
+        cells = [self.whole_cells("length", self.length), self.resolution]
+        if self.dimensions == 3:
+            cells.insert(1, self.whole_cells("width", self.width))
+        position = lattice(*(cell_centres(count, self.particle_spacing) for count in cells))
         return self.fluid(position, np.zeros_like(position), self.first_pressure(position))
 
     def first_pressure(self, position: FloatArray) -> FloatArray:
@@ -70,7 +86,7 @@ class DamBreak(FreeSurface):
 
         That is 1 − y less what the free side takes off, a Fourier series.
         """
-        x, y = position.T
+        x, y = position[:, 0], position[:, -1]
         wave, end = np.pi * TERMS[:, None] / 2, self.length
         along = (np.exp(wave * (x - end)) + np.exp(-wave * (x + end))) / (1 + np.exp(-2 * wave * end))
         return np.asarray(1 - y - (2 / wave**2 * np.cos(wave * y) * along).sum(axis=0))

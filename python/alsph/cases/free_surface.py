@@ -91,7 +91,7 @@ class FreeSurface(Case):
     """
 
     gravity: ClassVar[bool] = True
-    """Whether the body force (0, −1) acts."""
+    """Whether the body force (0, −1), in 3-D (0, 0, −1), acts."""
     tension: ClassVar[bool] = False
     """Whether the pressure may fall below that of the air, as in a fluid that turns."""
 
@@ -127,8 +127,8 @@ class FreeSurface(Case):
         return 1.0
 
     def body_force(self) -> list[float]:
-        """Return gravity, (0, −1) [U²/D], if it acts."""
-        return [0.0, -1.0] if self.gravity else [0.0, 0.0]
+        """Return gravity, which points down the last axis [U²/D], if it acts."""
+        return [0.0] * (self.space_dimensions - 1) + [-1.0 if self.gravity else 0.0]
 
     def settings(self) -> dict[str, Any]:
         """Return the engine's settings (see docs/architecture.md)."""
