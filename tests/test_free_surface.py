@@ -98,6 +98,16 @@ def test_a_tank_that_sways_a_little_has_the_level_of_linear_theory(tmp_path):
     assert len(profile.computed[0]) == len(profile.reference[0]) == 400
 
 
+def test_air_has_no_values(tmp_path, recwarn):
+    """On a grid that reaches far beyond the water."""
+    run = cases.DamBreak(resolution=12).run(tmp_path / "run", until=0.5, progress=False)
+    grid = run.to_grid()
+    (x, y), pressure = grid.axes.values(), grid.fields["pressure"]
+    in_air = (np.asarray(x)[:, None] > 3) | (np.asarray(y)[None, :] > 1.5)
+    assert np.isnan(pressure[in_air]).all() and np.isfinite(pressure[~in_air]).any()
+    assert not [warning for warning in recwarn if issubclass(warning.category, RuntimeWarning)]
+
+
 def test_gauges_tell_the_depth_of_a_lattice():
     case = cases.StillWater(resolution=20)
     levels = cases.free_surface.Levels([0.0, 0.3, 0.5, 1.0], 1.0, case.particle_spacing)

@@ -66,10 +66,11 @@ def at(snapshot: Snapshot, points: FloatArray, spacing: float, domain: Domain) -
     lower = np.array(domain.lower)
     points = np.where(domain.periodic, lower + (points - lower) % domain.size, points)
     position, fields = with_images(snapshot.position[fluid], fields, domain, REACH * spacing)
-    values, gradients = interpolate_parts(position, fields, points, spacing)
-    outside = ~domain.contains(points, 1e-9 * spacing)
-    void = outside | (neighbour_tree(position).query(points)[0] > VOID * spacing)
-    values[void], gradients[void] = np.nan, np.nan
+    near = neighbour_tree(position).query(points)[0] <= VOID * spacing
+    seen = near & domain.contains(points, 1e-9 * spacing)
+    values = np.full((len(points), fields.shape[1]), np.nan)
+    gradients = np.full((*values.shape, points.shape[1]), np.nan)
+    values[seen], gradients[seen] = interpolate_parts(position, fields, points[seen], spacing)
     return {
         "velocity": values[:, :-1],
         "pressure": values[:, -1],
