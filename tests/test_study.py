@@ -372,7 +372,7 @@ def test_reading_a_study_that_runs_does_not_disturb_it(done):
 
 
 def test_a_wall_time_ends_a_study_that_goes_on_later(tmp_path):
-    declared = declare(name="longer", base=LONG | {"run": {"until": 6.0}})
+    declared = declare(name="longer", base=LONG | {"run": {"until": 20.0}})
     with pytest.raises(WalltimeError, match="each run goes on when the study is run again"):
         study.run(declared, tmp_path, walltime=1.5, progress=False)
     assert {state.status for state in study.states(declared.points(), tmp_path).values()} <= {"stopped", "waiting"}
