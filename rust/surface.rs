@@ -59,12 +59,11 @@ pub struct Surface<const D: usize> {
     pub place: Vec<Place>,
     /// How much of ∇·u a particle may push with, of the real particles: λ², and less where neighbours are so close that they would push too hard.
     pub weight: Vec<f64>,
-    /// Twice the sum of slopes, negative, of the neighbours that the air has the place of, over that of the lattice the rest.
-    pub missing: Vec<f64>,
     found: Vec<Found<D>>,
     /// Of real particles and images: how hard neighbours push a particle over the lattice's, and 1 at the surface.
     strength: Vec<[f64; 2]>,
-    near: Vec<[f64; 2]>,
+    /// The largest of that around each real particle.
+    around: Vec<[f64; 2]>,
 }
 
 /// What a particle's own neighbours tell.
@@ -74,8 +73,8 @@ struct Found<const D: usize> {
     trace: f64,
     /// Smallest eigenvalue of α.
     least: f64,
-    /// −Σ slope.
-    sum: f64,
+    /// See [`Surface::missing`].
+    missing: f64,
     /// α⁻¹, with a floor under the eigenvalues of α.
     inverse: Matrix<D>,
     /// Σ slope r_ij.
@@ -86,7 +85,7 @@ impl<const D: usize> Poison for Found<D> {
     const POISON: Self = Self {
         trace: f64::NAN,
         least: f64::NAN,
-        sum: f64::NAN,
+        missing: f64::NAN,
         inverse: Tensor::<D>::POISON.0,
         first: <Vector<D> as Poison>::POISON,
     };
@@ -100,28 +99,36 @@ impl<const D: usize> Surface<D> {
 
     /// Unit normal of the surface at particle `i`, out of the fluid; zero where nothing tells it.
     pub fn normal(&self, i: usize) -> Vector<D> {
-        -(self.found[i].inverse * self.found[i].first).try_normalize(0.0).unwrap_or_else(Vector::zeros)
+        self.found[i].normal()
+    }
+
+    /// Σ |slope| that the neighbours of particle `i` lack of the lattice's: the air has their place.
+    pub fn missing(&self, i: usize) -> f64 {
+        self.found[i].missing
     }
 
     /// Find it in a frame, whose corrections it makes those of a cut support.
     pub fn find(&mut self, settings: &Settings, particles: &Particles<D>, frame: &mut Frame<D>) {
+        self.look_around(settings, particles, frame);
+        self.place_particles(settings, particles, frame);
+        self.weigh();
+    }
+
+    /// What the neighbours of each particle tell, and corrections with a floor.
+    fn look_around(&mut self, settings: &Settings, particles: &Particles<D>, frame: &mut Frame<D>) {
         let (sum, reach) = settings.lattice_sums();
-        let spacing = settings.particle_spacing;
-        let (sum, reach) = (sum / spacing.powi(2), reach / spacing);
-        let real = particles.real;
-        frame.images.blank(&mut self.found, real);
+        let (sum, reach) = (sum / settings.particle_spacing.powi(2), reach / settings.particle_spacing);
+        frame.images.blank(&mut self.found, particles.real);
         frame.images.blank(&mut self.strength, particles.len());
-        let strength = frame.images.real(&mut self.strength);
         frame.stencil.correct_and_for_each(
             Surroundings,
             &mut self.found,
-            strength,
+            frame.images.real(&mut self.strength),
             |_, (alpha, first, [slopes, lengths]), found, strength| {
                 let (values, vectors) = symmetric_eigen(&alpha);
-                let inverse = inverse_with_floor(&values, &vectors);
-                let least = values.min();
-                *found = Found { trace: alpha.trace() / D as f64, least, sum: slopes, inverse, first };
-                *strength = [lengths / values.min().max(FLOOR) / reach, 0.0];
+                let (least, inverse) = (values.min(), inverse_with_floor(&values, &vectors));
+                *found = Found { trace: alpha.trace() / D as f64, least, missing: (sum - slopes).max(0.0), inverse, first };
+                *strength = [lengths / least.max(FLOOR) / reach, 0.0];
             },
         );
         let found = &self.found;
@@ -131,18 +138,23 @@ impl<const D: usize> Surface<D> {
                 *correction = Correction { inverse: *inverse, asymmetry: inverse * first, ..*correction };
             }
         });
-        self.place.resize(real, Place::Inside);
-        let (stencil, found) = (&frame.stencil, &self.found);
+    }
+
+    /// Where each particle is.
+    fn place_particles(&mut self, settings: &Settings, particles: &Particles<D>, frame: &Frame<D>) {
+        let Self { place, found, strength, around, .. } = self;
+        let (stencil, found) = (&frame.stencil, &*found);
         let length = CONE_LENGTH * settings.smoothing_length();
         let cone_is_empty = |i: usize| {
-            let normal = -(found[i].inverse * found[i].first).normalize();
+            let normal = found[i].normal();
             stencil.neighbours.row(i).0.all().iter().all(|entry| {
                 let way = stencil.position[entry.j()] - stencil.position[i];
                 let distance = way.norm();
                 distance >= length || distance == 0.0 || way.dot(&normal) <= CONE * distance
             })
         };
-        parallel::for_each(&mut self.place, |i, place| {
+        place.resize(particles.real, Place::Inside);
+        parallel::for_each(place, |i, place| {
             let Found { trace, least, .. } = found[i];
             *place = if particles.kind[i] != ParticleKind::Fluid {
                 Place::Inside
@@ -154,31 +166,34 @@ impl<const D: usize> Surface<D> {
                 Place::Inside
             };
         });
-        let place = &self.place;
-        parallel::for_each(frame.images.real(&mut self.strength), |i, strength| {
+        parallel::for_each(frame.images.real(strength), |i, strength| {
             strength[1] = f64::from(u8::from(place[i] == Place::AtSurface));
         });
-        frame.images.fill(&mut self.strength);
-        frame.images.blank(&mut self.near, real);
-        frame.stencil.for_each_one(Largest(&self.strength), &mut self.near, |_, value, near| *near = value);
-        let near = &self.near;
-        self.weight.resize(real, 0.0);
-        parallel::for_each(&mut self.place, |i, place| {
-            if *place == Place::Inside
-                && particles.kind[i] == ParticleKind::Fluid
-                && found[i].trace < WHOLE
-                && near[i][1] > 0.0
-            {
+        frame.images.fill(strength);
+        frame.images.blank(around, particles.real);
+        stencil.for_each_one(Largest(strength), around, |_, value, around| *around = value);
+        parallel::for_each(place, |i, place| {
+            let is_cut = particles.kind[i] == ParticleKind::Fluid && found[i].trace < WHOLE;
+            if *place == Place::Inside && is_cut && around[i][1] > 0.0 {
                 *place = Place::Near;
             }
         });
-        let place = &self.place;
-        parallel::for_each(&mut self.weight, |i, weight| {
-            *weight =
-                if place[i] == Place::Isolated { 0.0 } else { 1.0f64.min(found[i].least.powi(2)).min(near[i][0].powi(-2)) };
+    }
+
+    fn weigh(&mut self) {
+        let Self { place, found, around, weight, .. } = self;
+        weight.resize(place.len(), 0.0);
+        parallel::for_each(weight, |i, weight| {
+            let most = found[i].least.powi(2).min(around[i][0].powi(-2)).min(1.0);
+            *weight = if place[i] == Place::Isolated { 0.0 } else { most };
         });
-        self.missing.resize(real, 0.0);
-        parallel::for_each(&mut self.missing, |i, missing| *missing = 2.0 * (sum - found[i].sum).max(0.0));
+    }
+}
+
+impl<const D: usize> Found<D> {
+    /// Unit normal out of the fluid; zero where nothing tells it.
+    fn normal(&self) -> Vector<D> {
+        -(self.inverse * self.first).try_normalize(0.0).unwrap_or_else(Vector::zeros)
     }
 }
 

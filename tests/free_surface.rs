@@ -5,7 +5,7 @@ use alsph::discretisation::{AdjointGradient, ConservativeGradient, Divergence};
 use alsph::frame::{Frame, Travel};
 use alsph::settings::Settings;
 use alsph::surface::{Place, Surface};
-use alsph::{Clock, Matrix, ParticleKind, Particles, Simulation, Vector};
+use alsph::{Clock, Matrix, Particles, Simulation, Vector};
 use approx::assert_relative_eq;
 use proptest::prelude::*;
 use serde_json::json;
@@ -53,18 +53,9 @@ fn block<const D: usize>(corner: [f64; D], counts: [usize; D], disorder: f64, se
 }
 
 fn fluid<const D: usize>(position: Vec<Vector<D>>, velocity: impl Fn(&Vector<D>) -> Vector<D>) -> Particles<D> {
-    let count = position.len();
-    Particles {
-        velocity: position.iter().map(velocity).collect(),
-        position,
-        pressure: vec![0.0; count],
-        kind: vec![ParticleKind::Fluid; count],
-        body: vec![0; count],
-        normal: vec![Vector::zeros(); count],
-        depth: vec![0.0; count],
-        id: (0..count as u64).collect(),
-        real: count,
-    }
+    let mut particles = common::particles(position);
+    particles.velocity = particles.position.iter().map(velocity).collect();
+    particles
 }
 
 fn found<const D: usize>(settings: &Settings, mut particles: Particles<D>) -> (Particles<D>, Frame<D>, Surface<D>) {

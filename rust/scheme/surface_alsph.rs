@@ -170,13 +170,14 @@ impl<const D: usize> SurfaceAlsph<D> {
     fn update_pressure(&mut self, step: Step, flow: &mut Flow<D>) {
         let Flow { particles, frame, surface, .. } = &mut *flow;
         frame.images.blank(&mut self.pressure_laplacian, particles.real);
-        let Surface { place, weight, missing, .. } = &*surface;
+        let surface = &*surface;
+        let Surface { place, weight, .. } = surface;
         let (pressure, air) = (&particles.pressure, &self.surface_pressure);
         frame.stencil.for_each_one(
             LaplacianAndItsSum(pressure),
             &mut self.pressure_laplacian,
             |i, (laplacian, sum), out| {
-                *out = if place[i].sees_air() { sum - missing[i] * (pressure[i] - air[i]) } else { laplacian };
+                *out = if place[i].sees_air() { sum - 2.0 * surface.missing(i) * (pressure[i] - air[i]) } else { laplacian };
             },
         );
         let Particles { kind, pressure, .. } = particles;
