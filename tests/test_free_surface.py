@@ -3,7 +3,7 @@
 import alsph
 import numpy as np
 import pytest
-from alsph import cases, reference
+from alsph import Domain, Units, cases, plotting, reference
 from alsph.errors import ConfigError
 
 SURFACES = [model for model in cases.CASES.values() if issubclass(model, cases.FreeSurface)]
@@ -171,3 +171,123 @@ def test_what_a_free_surface_does_not_have_is_refused(parameters, told):
 def test_a_column_beyond_its_tank_is_refused():
     with pytest.raises((ConfigError, ValueError), match="tank"):
         cases.DamBreak(length=6.0)
+
+
+@pytest.fixture(scope="module")
+def splash(tmp_path_factory):
+    """A dam break in a tank that is too low for it, past the impact."""
+    case = cases.DamBreak(resolution=10, tank_height=1.1)
+    return case.run(tmp_path_factory.mktemp("splash") / "run", until=4.0, progress=False, output_interval=0.5)
+
+
+def test_fluid_that_is_lost_is_told(splash):
+    (remark,) = [remark for remark in splash.remarks if remark.startswith("lost")]
+    share = 100 * splash.history["mass_out"][-1] / 2
+    assert f"{share:.2g} % of the fluid" in remark and share > 0
+    assert splash.profiles[0].computed[1].max() == splash.config.case.tank_length
+
+
+def test_a_transient_is_averaged_over_all_of_it_and_without_an_uncertainty(splash):
+    assert (splash.window.start, splash.window.end) == tuple(splash.history["time"][[0, -1]])
+    mean = splash.divergence.mean
+    assert np.isnan(mean.uncertainty) and not mean.developing
+    assert mean == pytest.approx(
+        np.average(splash.history["divergence_mean"], weights=splash.history["time_step"]), rel=0.05
+    )
+
+
+def test_a_film_shows_where_the_water_goes(splash, tmp_path, monkeypatch):
+    views = []
+    monkeypatch.setattr(
+        plotting.pictures, "field", lambda *_, view, **__: views.append(view) or plotting.style.blank(3, 2)
+    )
+    splash.animate("velocity", tmp_path / "film.gif")
+    ends = np.array([splash.snapshot(time).position.max(axis=0) for time in splash.times]).max(axis=0)
+    assert len(views) == len(splash.times) and len(set(views)) == 1
+    left, right, bottom, top = views[0]
+    assert (left, bottom) == (0, 0) and (right, top) == pytest.approx(ends, abs=0.1)
+
+
+def test_pictures_of_water_have_a_scale_from_the_pressure_of_the_air_on(splash, tmp_path):
+    assert splash.plot_field("pressure").axes[1].get_ylim()[0] == 0
+    assert splash.plot_field("vorticity").axes[1].get_ylim()[0] < 0
+    patch = cases.RotatingPatch(resolution=10).run(tmp_path / "patch", until=0.1, progress=False)
+    assert patch.plot_field("pressure").axes[1].get_ylim()[0] < 0
+
+
+def test_a_tall_picture_is_no_taller_than_a_page(splash):
+    width, height = splash.plot_field("velocity", view=(0, 0.2, 0, 4)).get_size_inches()
+    assert height < 1.5 * width
+
+
+def test_the_ledger_tells_the_whole_energy_and_what_lies_at_the_surface(splash):
+    labels = [axes.get_legend_handles_labels()[1] for axes in splash.plot_ledger().axes]
+    assert ["at the surface", "alone"] in labels and ["kinetic energy", "potential energy", "both"] in labels
+    assert not any("averaged" in label for label in sum(labels, []))
+
+
+def test_results_in_si_and_a_gravity_of_their_own(tmp_path):
+    units = Units(length=0.5, velocity=1, density=1000, kinematic_viscosity=1e-6)
+    case = cases.StandingWave(resolution=10, units=units)
+    (remark,) = case.remarks()
+    assert "g = U²/D = 2 m/s²" in remark and "2.215" in remark
+    assert not cases.StandingWave(resolution=10, units=units.replace(velocity=2.2147)).remarks()
+    assert not cases.EllipticalDrop(units=units).remarks()
+    run = case.run(tmp_path / "run", until=3.0, progress=False)
+    assert run.dimensional()["frequency of the wave, 1/s"] == pytest.approx(2 * run.measures[0].value)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "message"),
+    [
+        ("dam_break", {"length": 2.013}, "length = 2.013: not a whole number of particle spacings .* use 2 or 2.05"),
+        ("dam_break", {"dimensions": 3, "width": 0.013}, "width = 0.013: .* use 0.05"),
+        ("still_water", {"length": 1.01}, "length = 1.01: not a whole number"),
+        ("sloshing", {"gauge": 5}, "gauge = 5: outside of the tank; its length is 2.883"),
+    ],
+)
+def test_what_cannot_be_is_told_when_the_case_is_made(name, parameters, message):
+    with pytest.raises(ConfigError, match=message):
+        cases.CASES[name](**parameters)
+
+
+def test_a_side_that_a_free_surface_does_not_know_is_refused():
+    class Walled(cases.StillWater):
+        def domain(self):
+            return Domain([0, 0], [1, 2], [("none", "slip"), ("slip", "air")])
+
+    with pytest.raises(ConfigError, match="a side is 'none'; with a free surface take slip or periodic or air"):
+        Walled().build()
+
+
+def test_a_free_surface_does_not_begin_with_that_of_another_run(splash):
+    with pytest.raises(ConfigError, match="has a free surface, and begins where .* alsph resume"):
+        splash.config.case.simulation(initial_run=splash.path)
+
+
+def test_a_case_of_ones_own_tells_what_energy_it_made(tmp_path):
+    class Drop(cases.FreeSurface):
+        """A drop at rest."""
+
+        gravity = False
+
+        def domain(self):
+            return Domain([-2, -2], [2, 2], [("air", "air")] * 2)
+
+        def particles(self):
+            return cases.EllipticalDrop(resolution=10).particles()
+
+    class Driven(Drop):
+        """One that is pushed."""
+
+        def forcing(self, position, time):
+            return [np.cos(time), 0.0]
+
+    for model, names in ((Drop, ["largest rise of the energy over its start"]), (Driven, [])):
+        simulation = model(resolution=10).simulation()
+        simulation.advance(3)
+
+        class Record:
+            history = simulation.history()
+
+        assert [measure.name for measure in model(resolution=10).measures(Record)] == names

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from alsph.analysis.signals import amplitude_spectrum, batch_means, cycle_amplitudes, spectral_peak, upward_crossings
 from alsph.analysis.uncertainty import uncertainty_of_mean
-from alsph.analysis.window import DEVELOPING, Window, averaging_window, drift_of, with_trends
+from alsph.analysis.window import DEVELOPING, Window, averaging_window, drift_of, whole_record, with_trends
 from alsph.arrays import FloatArray
 
 __all__ = [  # with what the analysis of signals is made of
@@ -31,6 +31,7 @@ __all__ = [  # with what the analysis of signals is made of
     "spectral_peak",
     "strouhal",
     "upward_crossings",
+    "whole_record",
 ]
 
 

@@ -70,6 +70,13 @@ class Window:
         return float(self.edges[-1]) if self.edges.size else np.nan
 
 
+def whole_record(time: FloatArray) -> Window:
+    """Return the window of a flow that neither becomes steady nor periodic: all of its times tU/D (n,)."""
+    if len(time) < 3:
+        return Window(np.empty(0), 0, False, "no window: fewer than three samples")
+    return Window(np.linspace(time[0], time[-1], BATCHES_WITHOUT_CYCLES + 1), 0, False, "whole run, a transient")
+
+
 def averaging_window(time: FloatArray, drag: FloatArray, lift: FloatArray, thickness: float = 1.0) -> Window:
     """Cut the transient and return the whole shedding periods after it.
 

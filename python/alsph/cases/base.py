@@ -61,6 +61,8 @@ class Case(Driven):
     title: ClassVar[str]
     velocity_max: ClassVar[float] = 1.0
     """Expected largest velocity in U, for estimates of the time step."""
+    settles: ClassVar[bool] = True
+    """Whether the flow may become steady or periodic; if not, averages are of the whole run, without ±."""
     made_for: ClassVar[tuple[str, ...]] = ()
     """Parameters that the particles are made for beside what the engine's settings tell: no run changes them."""
     of_the_start: ClassVar[tuple[str, ...]] = ()
@@ -453,9 +455,9 @@ class Case(Driven):
         """
         cells = length * self.resolution
         if abs(cells - round(cells)) > 1e-6:
-            below, above = np.floor(cells) / self.resolution, np.ceil(cells) / self.resolution
+            near = [f"{count / self.resolution:.6g}" for count in (np.floor(cells), np.ceil(cells)) if count > 0]
             raise ValueError(
                 f"{name} = {length:g}: not a whole number of particle spacings (1/{self.resolution}); "
-                f"use {below:.6g} or {above:.6g}"
+                f"use {' or '.join(near)}"
             )
         return round(cells)

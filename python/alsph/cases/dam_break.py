@@ -48,6 +48,9 @@ class DamBreak(FreeSurface):
     def _the_tank_holds_the_column(self) -> Self:
         if self.length >= self.tank_length:
             raise ConfigError(f"length = {self.length:g}: does not fit into a tank_length of {self.tank_length:g}")
+        self.whole_cells("length", self.length)
+        if self.dimensions == 3:
+            self.whole_cells("width", self.width)
         return self
 
     @property
@@ -92,8 +95,8 @@ class DamBreak(FreeSurface):
         return np.asarray(1 - y - (2 / wave**2 * np.cos(wave * y) * along).sum(axis=0))
 
     def front(self, position: FloatArray) -> float:
-        """Return how far the water has come [H]: half a spacing before its third foremost particle."""
-        return float(np.sort(position[:, 0])[-3:][0] + self.particle_spacing / 2)
+        """Return how far the water has come [H]: half a spacing before its third foremost particle, or to the wall."""
+        return min(float(np.sort(position[:, 0])[-3:][0] + self.particle_spacing / 2), self.tank_length)
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the front beside an inviscid computation, before it meets the wall, and what energy was made."""

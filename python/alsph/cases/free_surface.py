@@ -15,10 +15,17 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
 from alsph.engine.simulation import Simulation
+from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind, particles
 
 COURANT = 0.2
 """Courant number of a step where none is given: the shortest waves of the surface are those of gravity."""
+
+SIDES = ("slip", "periodic", "air")
+"""What closes the sides of a domain in which there is a free surface."""
+
+GRAVITY = 9.81
+"""That of the earth [m/s²]."""
 
 
 class Levels:
@@ -90,6 +97,7 @@ class FreeSurface(Case):
     other schemes, bodies, inlets and outlets are not there yet.
     """
 
+    settles: ClassVar[bool] = False
     gravity: ClassVar[bool] = True
     """Whether the body force (0, −1), in 3-D (0, 0, −1), acts."""
     tension: ClassVar[bool] = False
@@ -132,6 +140,9 @@ class FreeSurface(Case):
 
     def settings(self) -> dict[str, Any]:
         """Return the engine's settings (see docs/architecture.md)."""
+        sides = {side for pair in self.checked_domain.boundaries for side in pair}
+        if other := sorted(sides.difference(SIDES)):
+            raise ConfigError(f"{self.name}: a side is '{other[0]}'; with a free surface take {' or '.join(SIDES)}")
         return super().settings() | {
             "free_surface": {
                 "reference_velocity": self.reference_velocity,
@@ -150,9 +161,25 @@ class FreeSurface(Case):
         pressure = pressure if self.tension else np.maximum(pressure, 0.0)
         return particles(Kind.FLUID, position, velocity, pressure=pressure)
 
+    def remarks(self) -> list[str]:
+        """Return what this resolution and method cannot carry, and units of another gravity than that of the earth."""
+        found = super().remarks()
+        if self.gravity and self.units and abs(self.units.factor("acceleration") / GRAVITY - 1) > 0.01:
+            told = f"units: U and D make g = U²/D = {self.units.factor('acceleration'):.3g} m/s²"
+            velocity = (GRAVITY * self.units.length) ** 0.5
+            found.append(f"{told}; on earth units_velocity is √(gH) = {velocity:.4g}")
+        return found
+
+    def measures(self, run: Record) -> list[Measure]:
+        """Return what energy was made."""
+        return self.energy_measures(run)
+
     def energy_measures(self, run: Record) -> list[Measure]:
-        """Return the largest rise of kinetic and potential energy above their least value before, over their start."""
-        if not len(run.history.get("potential_energy", [])):
+        """Return the largest rise of kinetic and potential energy above their least value before, over their start.
+
+        None where a force that depends on time does work, too.
+        """
+        if not len(run.history.get("potential_energy", [])) or "forcing" in self.rules:
             return []
         energy = run.history["kinetic_energy"] + run.history["potential_energy"]
         rise = (energy - np.minimum.accumulate(energy)).max() / energy[0]

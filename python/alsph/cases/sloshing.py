@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from alsph import reference
 from alsph.analysis.measures import Measure, Profile
@@ -14,6 +14,7 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.free_surface import FreeSurface, Levels
 from alsph.engine.output import Output
+from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_centres, lattice
 
@@ -50,6 +51,12 @@ class Sloshing(FreeSurface):
         description="phase φ of the tank, which is at A cos(ωt − φ) [degrees]",
     )
     gauge: float = Field(default=0.0833, ge=0, description="distance of the gauge from the left wall [H]")
+
+    @model_validator(mode="after")
+    def _the_gauge_is_in_the_tank(self) -> Self:
+        if self.gauge > self.length:
+            raise ConfigError(f"gauge = {self.gauge:g}: outside of the tank; its length is {self.length:g}")
+        return self
 
     @property
     def default_until(self) -> float:

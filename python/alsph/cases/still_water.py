@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
@@ -22,6 +22,11 @@ class StillWater(FreeSurface):
     title: ClassVar[str] = "water at rest in a tank"
 
     length: float = Field(default=1.0, gt=0, description="length of the tank [H]")
+
+    @model_validator(mode="after")
+    def _is_of_whole_cells(self) -> Self:
+        self.whole_cells("length", self.length)
+        return self
 
     @property
     def default_until(self) -> float:

@@ -88,6 +88,11 @@ class Domain:
         """Whether fluid enters or leaves through a side."""
         return any(side in ("inlet", "outlet") for pair in self.boundaries for side in pair)
 
+    @property
+    def meets_air(self) -> bool:
+        """Whether a side is open to the air."""
+        return any("air" in pair for pair in self.boundaries)
+
     def inlets(self) -> Iterator[tuple[int, int, float]]:
         """Yield axis, sign of the inward normal and plane of each side that is an inlet."""
         for axis, sides in enumerate(self.boundaries):

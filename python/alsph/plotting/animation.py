@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import itertools
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -84,6 +84,7 @@ def animate(
     times = [time for time in run.times if start <= time <= end][:: int(every)]
     if len(times) < 2:
         raise ConfigError(f"a film needs two snapshots or more, and there are {len(times)}; lower output_interval")
+    view = view or _extent(run, times, plane)
     view = pictures.extent_of(run.snapshot(times[0]), run.spacing, view, plane)
     if limit is None:
         chosen = sorted({times[round(k)] for k in np.linspace(0, len(times) - 1, SCALED_BY)})
@@ -105,6 +106,15 @@ def animate(
             _write_gif(frames(), temporary, fps)
         else:
             _write_video(frames(), temporary, fps, kind)
+
+
+def _extent(run: Record, times: Sequence[float], plane: Plane | None) -> tuple[float, float, float, float] | None:
+    """Return the view that holds the fluid at all times if it has a free surface; None: it stays where it is."""
+    if not pictures.meets_air(run.snapshot(times[0])):
+        return None
+    extents = np.array([pictures.extent_of(run.snapshot(time), run.spacing, None, plane) for time in times])
+    (left, _, bottom, _), (_, right, _, top) = extents.min(axis=0).tolist(), extents.max(axis=0).tolist()
+    return left, right, bottom, top
 
 
 def _pixels(figure: Figure) -> Frame:

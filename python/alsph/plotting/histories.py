@@ -103,9 +103,9 @@ def spectrum(runs: dict[str, Run], body: str | None = None) -> Figure:
     return figure
 
 
-def _finish(axes: Axes, window: Window, *, legend: bool = True) -> None:
-    """Shade the averaging window, and put the legend above the panel, where it hides nothing."""
-    if window.edges.size:
+def _finish(axes: Axes, window: Window | None, *, legend: bool = True) -> None:
+    """Shade the averaging window, if there is one, and put the legend above the panel, where it hides nothing."""
+    if window is not None and window.edges.size:
         label = f"averaged ({window.periods} periods)" if window.periods else "averaged"
         label += f", {DEVELOPING}" if window.developing else ""
         axes.axvspan(window.start, window.end, color="0.92", zorder=0, label=label)
@@ -133,16 +133,23 @@ def ledger(run: Run) -> Figure:
     ledger, history = run.ledger, run.history
     empty = np.empty(0)
     fluid, mass = history.get("fluid", empty), history.get("mass_in", empty) - history.get("mass_out", empty)
+    surface, potential = (history.get(name, empty) for name in ("surface", "potential_energy"))
+    volume = ("relative change", {"volume": ledger.volume_drift, "volume over exact": ledger.volume_error})
+    energy = {"kinetic energy": ledger.kinetic_energy}
+    if surface.any():  # then every particle has its volume
+        volume = ("share of the fluid", {"at the surface": surface / fluid, "alone": history["isolated"] / fluid})
+        if np.any(run.config.case.body_force()):
+            energy |= {"potential energy": potential, "both": ledger.kinetic_energy + potential}
     panels: list[tuple[str, dict[str, FloatArray]]] = [
         (r"$|\nabla\cdot\mathbf{u}|\,D/U$", {"largest": ledger.divergence_max, "mean": ledger.divergence_mean}),
-        ("relative change", {"volume": ledger.volume_drift, "volume over exact": ledger.volume_error}),
+        volume,
         ("iterations", {"inner iterations of a step": ledger.iterations}),
         (
             "relative change",
             {"fluid particles": fluid / fluid[:1] - 1, "mass in - out": mass / history.get("volume", empty)[:1]},
         ),
         (r"$\Delta tU/\Delta x$", {"time step": history.get("time_step", empty) / run.spacing}),
-        (r"$E\,/\,\rho U^2D^d$", {"kinetic energy": ledger.kinetic_energy}),
+        (r"$E\,/\,\rho U^2D^d$", energy),
         ("$u_{max}/U$", {"largest velocity": history.get("velocity_max", empty)}),
         (r"$\dot E\,/\,\rho U^3D^{d-1}$", {}),
     ]
@@ -158,7 +165,7 @@ def ledger(run: Run) -> Figure:
             axes.set_yscale("log")
         elif "change" not in label:
             axes.set_ylim(0, 1.1 * axes.dataLim.ymax if run.history["time"].size else None)
-        _finish(axes, run.window)
+        _finish(axes, run.window if run.config.case.settles else None)
     for axes in grid[-1]:
         axes.set_xlabel(TIME_LABEL)
     return figure

@@ -28,6 +28,8 @@ PIXELS_PER_SPACING = 2
 
 DENSITY = 1.5  # of streamlines: 45 along each side at most
 
+TALLEST = 1.5  # height over width, beyond which the picture is made narrower than its figure
+
 LARGEST_VIEW = 20_000  # spacings that a picture is wide or high at most
 
 
@@ -103,7 +105,8 @@ def field(
     """
     field_style(name)
     left, right, bottom, top = part = extent_of(snapshot, spacing, view, plane)
-    figure = blank(width, max(2.5, 0.81 * width * (top - bottom) / (right - left) + 0.75), "compressed")
+    height = 0.81 * width * min((top - bottom) / (right - left), TALLEST) + 0.75
+    figure = blank(width, max(2.5, height), "compressed")
     axes = figure.subplots()
     _draw_field(axes, snapshot, name, spacing, part, limit, plane)
     if flow is not None:
@@ -169,7 +172,11 @@ def _draw_field(
     if body.any():
         axes.contourf(body, levels=[0.5, np.inf], colors=["0.35"], **frame)
     label = style.label + (", less its mean" if name == "pressure" and _is_closed(snapshot) else "")
-    axes.figure.colorbar(image, ax=axes, label=label, extend="both" if style.signed else "max", pad=0.02, fraction=0.05)
+    above = name == "pressure" and meets_air(snapshot) and not np.nanmin(picture, initial=0.0) < 0
+    ends = "both" if style.signed and not above else "max"
+    bar = axes.figure.colorbar(image, ax=axes, label=label, extend=ends, pad=0.02, fraction=0.05)
+    if above:  # that of the air, as it is in water
+        bar.ax.set_ylim(0, limit)
     horizontal, vertical = (AXES[axis] for axis in (plane.across if plane else (0, 1)))
     axes.set(xlabel=f"${horizontal}/D$", ylabel=f"${vertical}/D$", aspect="equal")
     return limit
@@ -211,8 +218,12 @@ def _values(snapshot: Snapshot, name: str, whole: Snapshot, spacing: float) -> F
 
 def _is_closed(snapshot: Snapshot) -> bool:
     """Whether no fluid enters or leaves nor meets the air, so that the pressure is known but for a constant."""
-    meets_air = snapshot.domain is not None and any("air" in sides for sides in snapshot.domain.boundaries)
-    return not meets_air and not np.isin(snapshot.kind, (Kind.INLET, Kind.OUTLET)).any()
+    return not meets_air(snapshot) and not np.isin(snapshot.kind, (Kind.INLET, Kind.OUTLET)).any()
+
+
+def meets_air(snapshot: Snapshot) -> bool:
+    """Whether the fluid has a free surface, so that it goes where it will in its domain."""
+    return snapshot.domain is not None and snapshot.domain.meets_air
 
 
 def extent_of(

@@ -14,6 +14,10 @@ IN_UNITS: dict[str, Quantity] = {
     ", U": "velocity",
     ", U/D": "rate",
     ", ρU²": "pressure",
+    ", H": "length",
+    ", √(gH)": "velocity",
+    ", √(g/H)": "rate",
+    ", ρgH": "pressure",
     ", tU/D": "time",
     " tU/D": "time",
 }

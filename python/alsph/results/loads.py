@@ -78,6 +78,8 @@ class Loads(Fields):
     def window(self) -> Window:
         """Averaging window, found from the lift and the drag (see :func:`alsph.analysis.averages.averaging_window`)."""
         time = self.history["time"]
+        if not self.config.case.settles:
+            return averages.whole_record(time)
         missing = np.full(len(time), np.nan)
         drag, lift = (self.coefficient(axis) for axis in "xy") if self.body else (missing, missing)
         return averages.averaging_window(time, drag, lift, self.config.case.thickness if self.body else 1.0)
@@ -174,4 +176,5 @@ class Loads(Fields):
     def _measure(self, measure: Callable[[FloatArray, FloatArray, Window], Estimate], values: FloatArray) -> Estimate:
         if np.isnan(values).all():
             return Estimate(np.nan, note="no steps recorded yet" if len(values) == 0 else "no body to measure")
-        return measure(self.history["time"], values, self.window)
+        found = measure(self.history["time"], values, self.window)
+        return found if self.config.case.settles else Estimate(found, note=self.window.rule)

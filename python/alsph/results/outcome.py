@@ -21,7 +21,11 @@ def outcome(run: Record, until: float) -> list[str]:
         found.append(f"retried: broke down {len(retries)} times, went on with smaller time steps")
     if run.divergence.mean > DIVERGENCE:
         text = f"mean |∇·u| = {float(run.divergence.mean):.2g} U/D"
-        found.append(f"not divergence-free: {text}; more projection_sweeps or max_iterations lower it")
+        remedy = "more projection_sweeps or max_iterations lower it"
+        if "surface" in run.history and run.history["surface"].any():
+            remedy = "particles at the surface and alone in the air count, too; more projection_sweeps lower it"
+        found.append(f"not divergence-free: {text}; {remedy}")
+    found += lost(run)
     if run.body and run.window.edges.size:
         rule = run.window.rule
         if rule.startswith("still developing ("):
@@ -33,6 +37,17 @@ def outcome(run: Record, until: float) -> list[str]:
         if run.drag.mean < 0:
             found.append(f"unphysical: mean drag coefficient {run.drag.mean}; a stream drags a body at rest along")
     return found
+
+
+def lost(run: Record) -> list[str]:
+    """Remark on fluid that has left a flow with a free surface through the sides that are open to the air."""
+    surface, fluid = (run.history.get(name, np.empty(0)) for name in ("surface", "fluid"))
+    if not surface.any() or fluid[-1] >= fluid.max():
+        return []
+    share = 1 - fluid[-1] / fluid.max()
+    return [
+        f"lost: {100 * share:.2g} % of the fluid has left through the sides open to the air; a larger domain keeps it"
+    ]
 
 
 def unsolved(run: Record, tolerance: float, cap: int) -> list[str]:

@@ -37,6 +37,9 @@ def started(case: Case, state: dict[str, Any], initial_run: str | Path) -> dict[
     ConfigError, RunFolderError
         If the flow cannot be used.
     """
+    if case.checked_domain.meets_air:
+        told = f"initial_run = '{initial_run}': {case.name} has a free surface, and begins where its particles() has it"
+        raise ConfigError(f"{told}; go on with a run by alsph resume RUN --until TIME")
     run = Run(initial_run)
     state = sampling.initial_state(state, run, outlet=not unlike(case, run))
     for remark in remarks(case, run):
