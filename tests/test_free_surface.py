@@ -291,3 +291,28 @@ def test_a_case_of_ones_own_tells_what_energy_it_made(tmp_path):
             history = simulation.history()
 
         assert [measure.name for measure in model(resolution=10).measures(Record)] == names
+
+
+def test_a_wave_that_creeps_back_has_no_frequency(tmp_path):
+    run = cases.StandingWave(resolution=8, reynolds=3).run(tmp_path / "run", until=2.0, progress=False)
+    assert [measure.name for measure in run.measures] == ["largest rise of the energy over its start"]
+
+
+def test_an_energy_that_does_not_oscillate_is_no_wave(monkeypatch):
+    case = cases.StandingWave(resolution=8)
+    noise = np.random.default_rng(0).uniform(size=200)
+
+    class Record:
+        history = {"time": np.linspace(0.05, 10, 200), "kinetic_energy": noise, "potential_energy": np.ones(200)}
+
+    def fit(*_, **__):
+        raise RuntimeError("Optimal parameters not found")
+
+    monkeypatch.setattr("scipy.optimize.curve_fit", fit)
+    assert [measure.name for measure in case.measures(Record)] == ["largest rise of the energy over its start"]
+
+
+def test_a_steep_wave_is_remarked_on():
+    assert not cases.StandingWave(amplitude=0.05).remarks()
+    (remark,) = cases.StandingWave(amplitude=0.2).remarks()
+    assert remark.startswith("steep: a wave of ka = 0.63") and "4.9 % lower" in remark

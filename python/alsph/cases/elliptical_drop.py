@@ -53,7 +53,7 @@ class EllipticalDrop(FreeSurface):
         return float(a), float(rate)
 
     def measures(self, run: Record) -> list[Measure]:
-        """Return semi-axes and pressure at the centre at the last snapshot over the exact ones, and what energy is kept."""
+        """Return semi-axes and pressure at the centre at the last snapshot over the exact ones, and the energy kept."""
         rows = self.energy_measures(run)
         if not len(run.times) or run.times[-1] <= 0:
             return rows

@@ -44,10 +44,8 @@ def lost(run: Record) -> list[str]:
     surface, fluid = (run.history.get(name, np.empty(0)) for name in ("surface", "fluid"))
     if not surface.any() or fluid[-1] >= fluid.max():
         return []
-    share = 1 - fluid[-1] / fluid.max()
-    return [
-        f"lost: {100 * share:.2g} % of the fluid has left through the sides open to the air; a larger domain keeps it"
-    ]
+    share = f"{100 * (1 - fluid[-1] / fluid.max()):.2g} %"
+    return [f"lost: {share} of the fluid has left through the sides open to the air; a larger domain keeps it"]
 
 
 def unsolved(run: Record, tolerance: float, cap: int) -> list[str]:
