@@ -1,10 +1,14 @@
 """Cases with a free surface, beside their references."""
 
+import re
+from pathlib import Path
+
 import alsph
 import numpy as np
 import pytest
 from alsph import Domain, Units, cases, plotting, reference
 from alsph.errors import ConfigError
+from alsph.study.results import names
 
 SURFACES = [model for model in cases.CASES.values() if issubclass(model, cases.FreeSurface)]
 
@@ -283,14 +287,14 @@ def test_a_case_of_ones_own_tells_what_energy_it_made(tmp_path):
         def forcing(self, position, time):
             return [np.cos(time), 0.0]
 
-    for model, names in ((Drop, ["largest rise of the energy over its start"]), (Driven, [])):
+    for model, known in ((Drop, ["largest rise of the energy over its start"]), (Driven, [])):
         simulation = model(resolution=10).simulation()
         simulation.advance(3)
 
         class Record:
             history = simulation.history()
 
-        assert [measure.name for measure in model(resolution=10).measures(Record)] == names
+        assert [measure.name for measure in model(resolution=10).measures(Record)] == known
 
 
 def test_a_wave_that_creeps_back_has_no_frequency(tmp_path):
@@ -316,3 +320,27 @@ def test_a_steep_wave_is_remarked_on():
     assert not cases.StandingWave(amplitude=0.05).remarks()
     (remark,) = cases.StandingWave(amplitude=0.2).remarks()
     assert remark.startswith("steep: a wave of ka = 0.63") and "4.9 % lower" in remark
+
+
+@pytest.mark.parametrize("model", SURFACES)
+def test_a_study_knows_beforehand_what_a_run_measures(model, tmp_path):
+    case = model(resolution=8)
+    run = case.run(tmp_path / "run", until=min(case.default_until, 12.0), progress=False)
+    measures, profiles = names(run.config)
+    begins = tuple(name for name in measures if name.endswith("= "))
+    assert run.measures and all(each.name in measures or each.name.startswith(begins) for each in run.measures)
+    assert all(each.name in profiles for each in run.profiles)
+
+
+def test_the_case_of_ones_own_in_the_docs_runs():
+    """Its drops meet in the middle, and what they do on one side they do on the other."""
+    page = (Path(__file__).parents[1] / "docs" / "free_surface.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    space = {"__name__": "drops"}
+    exec(compile(example, "drops.py", "exec"), space)
+    simulation = space["TwoDrops"](resolution=8).simulation()
+    simulation.run_until(0.5)
+    state = simulation.state()
+    energy = simulation.history()["kinetic_energy"]
+    assert energy[-1] < energy[0] and np.diff(energy).max() < 1e-3 * energy[0]
+    assert state["velocity"].sum(axis=0) == pytest.approx(0, abs=1e-3 * len(state["kind"]))

@@ -33,6 +33,7 @@ class DamBreak(FreeSurface):
 
     name: ClassVar[str] = "dam_break"
     title: ClassVar[str] = "dam break in a tank"
+    later_names: ClassVar[tuple[str, ...]] = (*FreeSurface.later_names, "front at t = ")
     velocity_max: ClassVar[float] = 2.0
 
     length: float = Field(default=2.0, gt=0, description="length of the column [H]")

@@ -22,6 +22,13 @@ class EllipticalDrop(FreeSurface):
     name: ClassVar[str] = "elliptical_drop"
     title: ClassVar[str] = "drop that is stretched into an ellipse"
     gravity: ClassVar[bool] = False
+    later_names: ClassVar[tuple[str, ...]] = (
+        *FreeSurface.later_names,
+        "long semi-axis over exact",
+        "short semi-axis over exact",
+        "pressure at the centre over exact",
+        "kinetic energy over its start",
+    )
 
     resolution: int = Field(default=40, ge=8, description="particles per radius, D/Δx [-]")
 

@@ -24,6 +24,9 @@ COURANT = 0.2
 SIDES = ("slip", "periodic", "air")
 """What closes the sides of a domain in which there is a free surface."""
 
+ENERGY = "largest rise of the energy over its start"
+"""Name of the measure of what energy was made."""
+
 GRAVITY = 9.81
 """That of the earth [m/s²]."""
 
@@ -98,6 +101,7 @@ class FreeSurface(Case):
     """
 
     settles: ClassVar[bool] = False
+    later_names: ClassVar[tuple[str, ...]] = (ENERGY,)
     gravity: ClassVar[bool] = True
     """Whether the body force (0, −1), in 3-D (0, 0, −1), acts."""
     tension: ClassVar[bool] = False
@@ -183,4 +187,4 @@ class FreeSurface(Case):
             return []
         energy = run.history["kinetic_energy"] + run.history["potential_energy"]
         rise = (energy - np.minimum.accumulate(energy)).max() / energy[0]
-        return [Measure("largest rise of the energy over its start", float(rise), 0.0, 0.01, "energy is only lost")]
+        return [Measure(ENERGY, float(rise), 0.0, 0.01, "energy is only lost")]

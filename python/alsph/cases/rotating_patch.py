@@ -30,6 +30,11 @@ class RotatingPatch(FreeSurface):
     title: ClassVar[str] = "rotating square patch"
     gravity: ClassVar[bool] = False
     tension: ClassVar[bool] = True
+    later_names: ClassVar[tuple[str, ...]] = (
+        *FreeSurface.later_names,
+        "angular momentum over its start",
+        "kinetic energy over its start",
+    )
 
     resolution: int = Field(default=40, ge=8, description="particles per side, D/Δx [-]")
 

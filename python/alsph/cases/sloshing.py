@@ -41,6 +41,11 @@ class Sloshing(FreeSurface):
 
     name: ClassVar[str] = "sloshing"
     title: ClassVar[str] = "sloshing in a tank that sways"
+    later_names: ClassVar[tuple[str, ...]] = (
+        "crest near t = ",
+        "largest error of the elevation over the largest",
+        "elevation at the gauge",
+    )
 
     length: float = Field(default=2.883, gt=0, description="length of the tank [H]")
     tank_height: float = Field(default=2.5, gt=1, description="height above which spray is lost [H]")

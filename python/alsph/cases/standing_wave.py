@@ -26,6 +26,11 @@ class StandingWave(FreeSurface):
 
     name: ClassVar[str] = "standing_wave"
     title: ClassVar[str] = "standing wave in a tank"
+    later_names: ClassVar[tuple[str, ...]] = (
+        *FreeSurface.later_names,
+        "frequency of the wave, √(g/H)",
+        "decay rate of the amplitude, √(g/H)",
+    )
 
     resolution: int = Field(default=40, ge=8, description="particles over the depth, H/Δx [-]")
     reynolds: float = Field(default=500, gt=0, description="Reynolds number √(gH)H/ν [-]")

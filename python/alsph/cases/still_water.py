@@ -20,6 +20,11 @@ class StillWater(FreeSurface):
 
     name: ClassVar[str] = "still_water"
     title: ClassVar[str] = "water at rest in a tank"
+    later_names: ClassVar[tuple[str, ...]] = (
+        "largest velocity, √(gH)",
+        "rise of the level, Δx",
+        "error of the pressure, rms, ρgH",
+    )
 
     length: float = Field(default=1.0, gt=0, description="length of the tank [H]")
 
