@@ -1,5 +1,6 @@
 """Cases with a free surface, beside their references."""
 
+import json
 import re
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from alsph import Domain, Units, cases, plotting, reference
 from alsph.errors import ConfigError
 from alsph.study.results import names
+from alsph.watching.watched import Watched
 
 SURFACES = [model for model in cases.CASES.values() if issubclass(model, cases.FreeSurface)]
 
@@ -344,3 +346,19 @@ def test_the_case_of_ones_own_in_the_docs_runs():
     energy = simulation.history()["kinetic_energy"]
     assert energy[-1] < energy[0] and np.diff(energy).max() < 1e-3 * energy[0]
     assert state["velocity"].sum(axis=0) == pytest.approx(0, abs=1e-3 * len(state["kind"]))
+
+
+def test_water_in_space_is_seen_from_the_side(tmp_path):
+    run = cases.DamBreak(resolution=8, dimensions=3).run(tmp_path / "run", until=0.1, progress=False)
+    axes = run.plot_field("pressure").axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$x/D$", "$z/D$")
+    assert "$y/D$ = 0.25" in axes.get_title()
+    assert "$z/D$ = 0.1" in run.plot_field("pressure", plane="z=0.1").axes[0].get_title()
+
+
+def test_the_page_of_a_run_shows_the_whole_energy(splash, tmp_path):
+    (panel, *_) = json.loads(Watched(splash.path).state())["panels"]
+    assert list(panel["curves"]) == ["kinetic", "potential", "both"]
+    drop = cases.EllipticalDrop(resolution=8).run(tmp_path / "drop", until=0.1, progress=False)
+    (panel, *_) = json.loads(Watched(drop.path).state())["panels"]
+    assert list(panel["curves"]) == ["energy"]

@@ -63,6 +63,8 @@ class Case(Driven):
     """Expected largest velocity in U, for estimates of the time step."""
     settles: ClassVar[bool] = True
     """Whether the flow may become steady or periodic; if not, averages are of the whole run, without ±."""
+    picture_axis: ClassVar[str] = "z"
+    """Axis that the plane of pictures in 3-D is normal to where none is given."""
     made_for: ClassVar[tuple[str, ...]] = ()
     """Parameters that the particles are made for beside what the engine's settings tell: no run changes them."""
     of_the_start: ClassVar[tuple[str, ...]] = ()

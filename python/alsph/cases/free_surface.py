@@ -101,6 +101,7 @@ class FreeSurface(Case):
     """
 
     settles: ClassVar[bool] = False
+    picture_axis: ClassVar[str] = "y"
     later_names: ClassVar[tuple[str, ...]] = (ENERGY,)
     gravity: ClassVar[bool] = True
     """Whether the body force (0, −1), in 3-D (0, 0, −1), acts."""

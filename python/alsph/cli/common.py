@@ -43,7 +43,10 @@ Retry = Annotated[int, typer.Option(help="how often a run that breaks down goes 
 
 Plane = Annotated[
     str | None,
-    typer.Option(help="plane of the fields in 3-D, z=0.5 or y [D]", show_default="z, through the middle of the body"),
+    typer.Option(
+        help="plane of the fields in 3-D, z=0.5 or y [D]",
+        show_default="z, y with a free surface, through the middle of the body",
+    ),
 ]
 
 Threads = Annotated[int | None, typer.Option(help="number of threads", show_default="the run's")]

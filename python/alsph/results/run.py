@@ -236,8 +236,8 @@ class Run(Loads):
         view : (left, right, bottom, top), optional
             Part of the plane to show [D]; all of it if None.
         plane : str, optional
-            In 3-D the plane, such as ``"z=0.5"`` or ``"y"`` [D]; by default normal to z through the middle of the body,
-            or of the flow.
+            In 3-D the plane, such as ``"z=0.5"`` or ``"y"`` [D]; by default normal to z, with a free surface to y,
+            through the middle of the body, or of the flow.
         streamlines : bool
             Draw streamlines over it, in 3-D those of the velocity along the plane.
         """
@@ -268,7 +268,8 @@ class Run(Loads):
             if given is not None:
                 raise ConfigError(f"plane = {shown(given)}: the run is in 2-D; leave it out")
             return None
-        return Plane.of(given, self.config.case.middle)
+        case = self.config.case
+        return Plane.of(case.picture_axis if given is None else given, case.middle)
 
     def animate(self, name: Field = "vorticity", path: str | Path | None = None, **options: Any) -> Path:
         """Make a film of a field from the snapshots.

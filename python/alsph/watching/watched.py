@@ -215,8 +215,12 @@ def _forces(run: Run) -> list[dict[str, Any]]:
     """Return drag and lift of the bodies, of runs without any the kinetic energy."""
     time = run.history["time"]
     if not run.body:
-        energy = run.history.get("kinetic_energy", np.full(len(time), np.nan))
-        return [_panel("kinetic energy E / ρU²Dᵈ", {"energy": energy})]
+        missing = np.full(len(time), np.nan)
+        kinetic, potential = (run.history.get(f"{name}_energy", missing) for name in ("kinetic", "potential"))
+        if np.nan_to_num(run.history.get("surface", missing)).any() and potential.any():
+            curves = {"kinetic": kinetic, "potential": potential, "both": kinetic + potential}
+            return [_panel("energy E / ρU²Dᵈ", curves)]
+        return [_panel("kinetic energy E / ρU²Dᵈ", {"energy": kinetic})]
     found = []
     for name, axis in (("drag", "x"), ("lift", "y")):
         curves = {part: run.coefficient(axis, part) for part in ("total", "pressure", "viscous")}
