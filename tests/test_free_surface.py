@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from alsph import Domain, Units, cases, plotting, reference
 from alsph.errors import ConfigError
+from alsph.results import outcome
 from alsph.study.results import names
 from alsph.watching.watched import Watched
 
@@ -112,6 +113,19 @@ def test_air_has_no_values(tmp_path, recwarn):
     in_air = (np.asarray(x)[:, None] > 3) | (np.asarray(y)[None, :] > 1.5)
     assert np.isnan(pressure[in_air]).all() and np.isfinite(pressure[~in_air]).any()
     assert not [warning for warning in recwarn if issubclass(warning.category, RuntimeWarning)]
+
+
+def test_what_would_not_fit_into_memory_is_refused_before_it_is_made():
+    for case in (cases.DamBreak(resolution=1_000_000), cases.EllipticalDrop(resolution=1_000_000)):
+        assert case.particle_estimate() > 1e12
+        with pytest.raises(ConfigError, match="memory"):
+            case.build()
+
+
+def test_an_older_run_that_goes_on_has_no_free_surface():
+    """What it has not recorded is NaN."""
+    history = {"surface": np.full(3, np.nan), "fluid": np.array([5.0, 4.0, 3.0])}
+    assert not outcome.has_surface(history) and outcome.has_surface({"surface": np.array([np.nan, 2.0])})
 
 
 def test_gauges_tell_the_depth_of_a_lattice():

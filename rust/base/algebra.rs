@@ -3,7 +3,7 @@
 pub type Vector<const D: usize> = nalgebra::SVector<f64, D>;
 pub type Matrix<const D: usize> = nalgebra::SMatrix<f64, D, D>;
 
-/// A symmetric matrix that a particle carries.
+/// A matrix that a particle carries.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tensor<const D: usize>(pub Matrix<D>);
 

@@ -28,8 +28,10 @@ pub fn end_step<const D: usize>(particles: &mut Particles<D>, settings: &Setting
     let (mut left, mut gone) = leave(particles, &near, &of(Boundary::Outlet), settings.buffer_length());
     let open = of(Boundary::Air);
     let is_lost = |&i: &usize| open.iter().any(|side| side.inside(&particles.position[i]) < 0.0);
-    let lost = near.iter().copied().filter(|&i| particles.kind[i] == ParticleKind::Fluid).filter(is_lost);
-    gone.extend(lost.inspect(|_| left += 1));
+    let fluid = near.iter().copied().filter(|&i| particles.kind[i] == ParticleKind::Fluid);
+    let lost: Vec<_> = fluid.filter(is_lost).collect();
+    left += lost.len() as i64;
+    gone.extend(lost);
     let entered = enter(particles, &near, &of(Boundary::Inlet), settings, grid);
     if !gone.is_empty() {
         let mut keep = vec![true; particles.real];

@@ -33,7 +33,7 @@ pub struct ConservativeGradient<'a, F> {
     pub own: F,
 }
 
-/// Σ slope (M_i + M_j) r_ij of a field of symmetric matrices: with M = q α⁻¹ and equal volumes it is minus the adjoint of [`Divergence`],
+/// Σ slope (M_i + M_j) r_ij of a field of matrices: with M = q α⁻¹ and equal volumes it is minus the adjoint of [`Divergence`],
 /// Σ u·(of M) = −Σ q ∇·u, and a gradient of q where neighbours are evenly spread.
 pub struct AdjointGradient<'a, const D: usize, F> {
     pub tensor: &'a [Tensor<D>],
@@ -125,16 +125,7 @@ impl<const D: usize> Operator<D> for LaplacianAndItsSum<'_> {
 
     #[inline(always)]
     fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [(f64, f64); LANES] {
-        let here: V = near.cluster().lanes(|i| self.0[i]);
-        let (mut sum, mut linear) = (V::zero(), [V::zero(); D]);
-        near.for_each(
-            #[inline(always)]
-            |j, slope: V, r_ij| {
-                let difference = (V::splat(self.0[j]) - here) * slope;
-                sum += difference;
-                add_product(&mut linear, difference, r_ij);
-            },
-        );
+        let (sum, linear) = differences(near, self.0);
         let laplacian = corrected_laplacian(sum, linear, &near.corrections());
         let sum = sum.store();
         std::array::from_fn(|lane| (laplacian[lane], -2.0 * sum[lane]))
@@ -239,17 +230,8 @@ impl<const D: usize> Operator<D> for Laplacian<'_> {
 
     #[inline(always)]
     fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [f64; LANES] {
-        let here: V = near.cluster().lanes(|i| self.0[i]);
-        let (mut laplacian, mut linear) = (V::zero(), [V::zero(); D]);
-        near.for_each(
-            #[inline(always)]
-            |j, slope: V, r_ij| {
-                let difference = (V::splat(self.0[j]) - here) * slope;
-                laplacian += difference;
-                add_product(&mut linear, difference, r_ij);
-            },
-        );
-        corrected_laplacian(laplacian, linear, &near.corrections())
+        let (sum, linear) = differences(near, self.0);
+        corrected_laplacian(sum, linear, &near.corrections())
     }
 }
 
@@ -328,6 +310,22 @@ fn uncorrected_gradient<V: Lanes, const D: usize>(near: &mut impl Neighbours<V, 
         },
     );
     tensor
+}
+
+/// Σ slope (f_j − f_i) and Σ slope (f_j − f_i) r_ij.
+#[inline(always)]
+fn differences<V: Lanes, const D: usize>(near: &mut impl Neighbours<V, D>, field: &[f64]) -> (V, [V; D]) {
+    let here: V = near.cluster().lanes(|i| field[i]);
+    let (mut sum, mut linear) = (V::zero(), [V::zero(); D]);
+    near.for_each(
+        #[inline(always)]
+        |j, slope: V, r_ij| {
+            let difference = (V::splat(field[j]) - here) * slope;
+            sum += difference;
+            add_product(&mut linear, difference, r_ij);
+        },
+    );
+    (sum, linear)
 }
 
 /// α⁻¹ times a vector.

@@ -138,13 +138,12 @@ impl<const D: usize> Images<D> {
         slope: impl Fn(usize) -> Vector<D> + Sync + Send,
     ) {
         let real = pressure.len() - self.source.len();
-        let (real_pressure, images) = pressure.split_at_mut(real);
-        parallel::for_each(images, |k, p| {
+        self.renew(pressure, |k, p| {
             let source = self.source[k] as usize;
             let (slope, way) = (slope(source), position[real + k] - position[source]);
             // A periodic side has the same pressure on both sides.
             let walls = (0..D).filter(|&axis| self.sign[k][axis] < 0.0);
-            *p = real_pressure[source] + walls.map(|axis| slope[axis] * way[axis]).sum::<f64>();
+            p + walls.map(|axis| slope[axis] * way[axis]).sum::<f64>()
         });
     }
 

@@ -9,13 +9,13 @@
 //! ```
 //!
 //! G* is minus the adjoint of the divergence, w a weight that is 1 inside, P a gradient that is antisymmetric in pairs. In ∇²p next to
-//! the surface the neighbours that are missing are air, at p = 0.
+//! the surface the neighbours that are missing are air, at p = 0. There are no solids: settings with bodies are refused.
 
-use crate::base::{Matrix, Tensor, Vector, parallel};
-use crate::boundary::{VelocityRule, conditions, extend_pressure, extrapolate_scalar};
+use crate::base::{Tensor, Vector, parallel};
+use crate::boundary::{VelocityRule, conditions};
 use crate::discretisation::{AdjointGradient, ConservativeGradient, Divergence, LaplacianAndGradient, LaplacianAndItsSum};
 use crate::flow::{Flow, Step};
-use crate::particles::{ParticleKind, Particles};
+use crate::particles::Particles;
 use crate::scheme::projection::{EIGENVALUE_MARGIN, weight};
 use crate::scheme::{Derived, Scheme, Solved};
 use crate::settings::{Eigenvalues, FreeSurface, PressureGradient, Settings, TimeStepLimits};
@@ -33,13 +33,12 @@ pub struct SurfaceAlsph<const D: usize> {
     strain_rate: Vec<Tensor<D>>,
     /// Of the real particles that see air: the pressure of that surface.
     surface_pressure: Vec<f64>,
-    /// ∇·u less θ; that of solids extrapolated.
+    /// ∇·u less θ.
     divergence: Vec<f64>,
     /// What G* is taken of.
     tensor: Vec<Tensor<D>>,
     velocity_star: Vec<Vector<D>>,
     pressure_laplacian: Vec<f64>,
-    near_walls: Vec<Vector<D>>,
 }
 
 impl<const D: usize> SurfaceAlsph<D> {
@@ -56,15 +55,12 @@ impl<const D: usize> SurfaceAlsph<D> {
             tensor: Vec::new(),
             velocity_star: Vec::new(),
             pressure_laplacian: Vec::new(),
-            near_walls: Vec::new(),
         }
     }
 
     /// What ∇·u^{n+1} is to be in the frame, and ∇²u^n.
     fn begin(&mut self, step: Step, flow: &mut Flow<D>) {
-        let Flow { particles, frame, walls, surface, .. } = flow;
-        walls.see(step.settings, particles, frame);
-        let walls = &*walls;
+        let Flow { particles, frame, surface, .. } = flow;
         frame.images.blank(&mut self.derived, particles.real);
         frame.images.blank(&mut self.divergence, particles.len());
         frame.images.blank(&mut self.strain_rate, particles.real);
@@ -72,7 +68,7 @@ impl<const D: usize> SurfaceAlsph<D> {
         let (relaxation, undisturbed) = (self.own.packing_relaxation / step.time_step, self.undisturbed);
         let velocity = &particles.velocity;
         frame.stencil.for_each(
-            LaplacianAndGradient { velocity, seen: |s, i| walls.seen_by(particles, s, i) },
+            LaplacianAndGradient { velocity, seen: |s: usize, _: usize| velocity[s] },
             &mut self.derived,
             &mut self.strain_rate,
             |i, (laplacian, gradient), derived, strain_rate| {
@@ -124,22 +120,17 @@ impl<const D: usize> SurfaceAlsph<D> {
     }
 
     /// w q B of all particles, from the divergence of the fluid.
-    fn form_tensor(&mut self, step: Step, Flow { particles, frame, surface, .. }: &Flow<D>) {
-        extrapolate_scalar(step.settings, frame, &particles.kind[..particles.real], &mut self.divergence);
+    fn form_tensor(&mut self, Flow { particles, frame, surface, .. }: &Flow<D>) {
         frame.images.blank(&mut self.tensor, particles.len());
         let (divergence, weight) = (&self.divergence, &surface.weight);
         parallel::for_each(frame.images.real(&mut self.tensor), |i, tensor| {
-            tensor.0 = if particles.kind[i] == ParticleKind::Solid {
-                Matrix::identity() * divergence[i]
-            } else {
-                frame.stencil.correction[i].inverse * (weight[i] * divergence[i])
-            };
+            tensor.0 = frame.stencil.correction[i].inverse * (weight[i] * divergence[i]);
         });
         frame.images.fill(&mut self.tensor);
     }
 
-    fn extend_pressure(&mut self, step: Step, Flow { particles, frame, body_force, surface, .. }: &mut Flow<D>) {
-        extend_pressure(step.settings, frame, particles, body_force, &mut self.near_walls);
+    /// The pressure that images show.
+    fn extend_pressure(step: Step, Flow { particles, frame, body_force, surface, .. }: &mut Flow<D>) {
         let (place, density) = (&surface.place, step.settings.density);
         frame.images.fill_pressure(&mut particles.pressure, &particles.position, |i| match place[i] {
             Place::Inside | Place::Near => body_force.at(i) * density,
@@ -148,7 +139,7 @@ impl<const D: usize> SurfaceAlsph<D> {
     }
 
     fn predict_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
-        self.form_tensor(step, flow);
+        self.form_tensor(flow);
         let Flow { particles, frame, before, .. } = flow;
         let condition = conditions(step.settings);
         let (dt, viscosity, penalty) = (step.time_step, step.settings.kinematic_viscosity, self.penalty);
@@ -180,13 +171,10 @@ impl<const D: usize> SurfaceAlsph<D> {
                 *out = if place[i].sees_air() { sum - 2.0 * surface.missing(i) * (pressure[i] - air[i]) } else { laplacian };
             },
         );
-        let Particles { kind, pressure, .. } = particles;
+        let pressure = &mut particles.pressure;
         let (density, dt, penalty) = (step.settings.density, step.time_step, self.penalty);
         let (laplacian, derived, tension) = (&self.pressure_laplacian, &self.derived, self.own.tension);
         frame.stencil.for_each_one(Divergence(&self.velocity_star), frame.images.real(pressure), |i, divergence, p| {
-            if kind[i] == ParticleKind::Solid {
-                return;
-            }
             if place[i] == Place::Isolated {
                 *p = 0.0;
                 return;
@@ -196,7 +184,7 @@ impl<const D: usize> SurfaceAlsph<D> {
                 *p = p.max(0.0);
             }
         });
-        self.extend_pressure(step, flow);
+        Self::extend_pressure(step, flow);
     }
 
     fn correct_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
@@ -251,7 +239,7 @@ impl<const D: usize> SurfaceAlsph<D> {
             let relaxation = relaxation / weight(step.settings, sweep);
             let factor = step.settings.density * relaxation / step.time_step;
             self.measure_divergence(flow);
-            self.form_tensor(step, flow);
+            self.form_tensor(flow);
             let Flow { particles, frame, surface, .. } = &mut *flow;
             let condition = conditions(step.settings);
             let Particles { kind, position, pressure, velocity, .. } = particles;
@@ -273,7 +261,7 @@ impl<const D: usize> SurfaceAlsph<D> {
             );
             frame.images.fill(velocity);
         }
-        self.extend_pressure(step, flow);
+        Self::extend_pressure(step, flow);
     }
 }
 
@@ -283,11 +271,10 @@ impl<const D: usize> Scheme<D> for SurfaceAlsph<D> {
     }
 
     fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> Solved {
-        let velocity = step.velocity_max.max(self.own.reference_velocity);
-        self.penalty = step.settings.penalty(velocity, step.time_step, self.largest.laplacian);
+        self.penalty = step.settings.penalty(step.velocity_max, step.time_step, self.largest.laplacian);
         self.begin(step, flow);
         self.free_of_stress(step, flow);
-        self.extend_pressure(step, flow);
+        Self::extend_pressure(step, flow);
         for iteration in 1..=step.settings.max_iterations {
             if iteration > 1 {
                 self.measure_divergence(flow);
@@ -298,7 +285,6 @@ impl<const D: usize> Scheme<D> for SurfaceAlsph<D> {
         }
         self.sweep(step, flow);
         self.measure_divergence(flow);
-        flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
         Solved::after(step.settings.max_iterations)
     }
 

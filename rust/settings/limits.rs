@@ -26,7 +26,7 @@ impl Settings {
     pub fn time_step_limits(&self, velocity_max: f64, largest: Eigenvalues) -> TimeStepLimits {
         let gravity = self.body_force.iter().map(|g| g * g).sum::<f64>().sqrt();
         let h = self.smoothing_length();
-        let velocity_max = velocity_max.max(self.free_surface.map_or(0.0, |surface| surface.reference_velocity));
+        let velocity_max = self.reference_velocity(velocity_max);
         let spacing = self.particle_spacing;
         let wave = |constant: f64| velocity_max * (constant * largest.laplacian / 2.0).sqrt();
         TimeStepLimits {
@@ -51,9 +51,15 @@ impl Settings {
         }
     }
 
+    /// u_max, beside a free surface at least U₀.
+    fn reference_velocity(&self, velocity_max: f64) -> f64 {
+        velocity_max.max(self.free_surface.map_or(0.0, |surface| surface.reference_velocity))
+    }
+
     /// r_AL of a step: C_BV u_max² Δt, or half of what the stability law allows, r_AL Δt λ_max = 1: then an iteration takes off all that
     /// the Laplacian's shortest waves have of ∇·u, and less of longer ones.
     pub fn penalty(&self, velocity_max: f64, time_step: f64, largest_eigenvalue: f64) -> f64 {
+        let velocity_max = self.reference_velocity(velocity_max);
         match self.penalty_constant {
             Some(constant) => constant * velocity_max * velocity_max * time_step,
             None => self.particle_spacing.powi(2) / (largest_eigenvalue * time_step),

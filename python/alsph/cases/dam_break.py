@@ -77,6 +77,11 @@ class DamBreak(FreeSurface):
         """Point that slices for pictures go through in 3-D [H]: in the water, as long as there is some."""
         return np.array([self.tank_length / 2, self.width / 2, 0.05])
 
+    @property
+    def initial_volume(self) -> float:
+        """That of the column [H^d]."""
+        return self.length * (self.width if self.dimensions == 3 else 1.0)
+
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return the column at rest, with the pressure of its first instant."""
         cells = [self.whole_cells("length", self.length), self.resolution]

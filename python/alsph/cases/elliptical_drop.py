@@ -41,6 +41,11 @@ class EllipticalDrop(FreeSurface):
         """Return a box that is open on all sides."""
         return Domain([-6, -3], [6, 3], [("air", "air")] * 2)
 
+    @property
+    def initial_volume(self) -> float:
+        """That of the round drop [D²]."""
+        return np.pi
+
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return those particles of a lattice that lie in the circle."""
         axis = cell_centres(2 * self.resolution, self.particle_spacing) - 1

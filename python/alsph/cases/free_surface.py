@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -157,9 +158,14 @@ class FreeSurface(Case):
             }
         }
 
+    @property
+    def initial_volume(self) -> float:
+        """About the volume of the fluid at the start [D^d], without making its particles; by default the domain's."""
+        return math.prod(self.checked_domain.size)
+
     def particle_estimate(self) -> int:
         """Return about how many particles there are: those of the fluid."""
-        return len(self.particles()["kind"])
+        return round(self.initial_volume * float(self.resolution) ** self.space_dimensions)
 
     def fluid(self, position: FloatArray, velocity: FloatArray, pressure: FloatArray) -> dict[str, NDArray[Any]]:
         """Return fluid particles, whose pressure is not below that of the air unless tension is allowed."""

@@ -47,6 +47,11 @@ class RotatingPatch(FreeSurface):
         """Return a box that is open on all sides."""
         return Domain([-4, -4], [4, 4], [("air", "air")] * 2)
 
+    @property
+    def initial_volume(self) -> float:
+        """That of the square [D²]."""
+        return 1.0
+
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a lattice that turns, with the pressure of its first instant."""
         axis = cell_centres(self.resolution, self.particle_spacing) - 0.5

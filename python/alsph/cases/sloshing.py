@@ -73,15 +73,23 @@ class Sloshing(FreeSurface):
         return Domain([0, 0], [self._whole_length, self.tank_height], [("slip", "slip"), ("slip", "air")])
 
     @property
+    def _columns(self) -> int:
+        return round(self.length * self.resolution)
+
+    @property
     def _whole_length(self) -> float:
         """The length, to a whole number of particles."""
-        return round(self.length * self.resolution) / self.resolution
+        return self._columns / self.resolution
+
+    @property
+    def initial_volume(self) -> float:
+        """That of the water [H²]."""
+        return self._whole_length
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a lattice at rest with the hydrostatic pressure."""
         spacing = self.particle_spacing
-        columns = round(self.length * self.resolution)
-        position = lattice(cell_centres(columns, spacing), cell_centres(self.resolution, spacing))
+        position = lattice(cell_centres(self._columns, spacing), cell_centres(self.resolution, spacing))
         return self.fluid(position, np.zeros_like(position), 1 - position[:, 1])
 
     def forcing(self, position: FloatArray, time: float) -> ArrayLike | None:

@@ -45,6 +45,11 @@ class StandingWave(FreeSurface):
         """Return the tank, whose top is open."""
         return Domain([0, 0], [1, 2], [("slip", "slip"), ("slip", "air")])
 
+    @property
+    def initial_volume(self) -> float:
+        """That of the water [H²]."""
+        return 1.0
+
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a lattice moved as the water is by the wave, without a change of volume, at rest."""
         x, y = lattice(*[cell_centres(self.resolution, self.particle_spacing)] * 2).T

@@ -42,6 +42,11 @@ class StillWater(FreeSurface):
         """Return the tank, whose top is open."""
         return Domain([0, 0], [self.length, 2], [("slip", "slip"), ("slip", "air")])
 
+    @property
+    def initial_volume(self) -> float:
+        """That of the water [H²]."""
+        return self.length
+
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a lattice at rest with the hydrostatic pressure."""
         columns = self.whole_cells("length", self.length)

@@ -12,6 +12,7 @@ from alsph.analysis.window import DEVELOPING
 from alsph.arrays import FloatArray
 from alsph.plotting.style import PALETTE, TIME_LABEL, blank, line
 from alsph.results.ledger import Ledger
+from alsph.results.outcome import has_surface
 from alsph.results.run import Run
 
 if TYPE_CHECKING:
@@ -136,7 +137,7 @@ def ledger(run: Run) -> Figure:
     surface, potential = (history.get(name, empty) for name in ("surface", "potential_energy"))
     volume = ("relative change", {"volume": ledger.volume_drift, "volume over exact": ledger.volume_error})
     energy = {"kinetic energy": ledger.kinetic_energy}
-    if surface.any():  # then every particle has its volume
+    if has_surface(history):  # then every particle has its volume
         volume = ("share of the fluid", {"at the surface": surface / fluid, "alone": history["isolated"] / fluid})
         if np.any(run.config.case.body_force()):
             energy |= {"potential energy": potential, "both": ledger.kinetic_energy + potential}

@@ -1,8 +1,11 @@
 """How a run ended, in words, as those of :mod:`alsph.cases.remarks`."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
 
 DIVERGENCE = 0.02
 """Mean |∇·u| [U/D] above which it is remarked upon; runs with the defaults have 1e-4 to 5e-3 (docs/results.md)."""
@@ -22,7 +25,7 @@ def outcome(run: Record, until: float) -> list[str]:
     if run.divergence.mean > DIVERGENCE:
         text = f"mean |∇·u| = {float(run.divergence.mean):.2g} U/D"
         remedy = "more projection_sweeps or max_iterations lower it"
-        if "surface" in run.history and run.history["surface"].any():
+        if has_surface(run.history):
             remedy = "particles at the surface and alone in the air count, too; more projection_sweeps lower it"
         found.append(f"not divergence-free: {text}; {remedy}")
     found += lost(run)
@@ -39,10 +42,15 @@ def outcome(run: Record, until: float) -> list[str]:
     return found
 
 
+def has_surface(history: Mapping[str, FloatArray]) -> bool:
+    """Whether particles have been at a free surface; what an older version has not recorded is NaN."""
+    return bool(np.nan_to_num(history.get("surface", np.empty(0))).any())
+
+
 def lost(run: Record) -> list[str]:
     """Remark on fluid that has left a flow with a free surface through the sides that are open to the air."""
-    surface, fluid = (run.history.get(name, np.empty(0)) for name in ("surface", "fluid"))
-    if not surface.any() or fluid[-1] >= fluid.max():
+    fluid = run.history.get("fluid", np.empty(0))
+    if not has_surface(run.history) or fluid[-1] >= fluid.max():
         return []
     share = f"{100 * (1 - fluid[-1] / fluid.max()):.2g} %"
     return [f"lost: {share} of the fluid has left through the sides open to the air; a larger domain keeps it"]

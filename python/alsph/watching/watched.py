@@ -20,6 +20,7 @@ from alsph.cases.source import shown_name
 from alsph.errors import RunFolderError
 from alsph.folder.reading import History
 from alsph.plotting.histories import robust_limits
+from alsph.results.outcome import has_surface
 from alsph.results.run import Run
 from alsph.text import contents, duration, printable
 
@@ -217,7 +218,7 @@ def _forces(run: Run) -> list[dict[str, Any]]:
     if not run.body:
         missing = np.full(len(time), np.nan)
         kinetic, potential = (run.history.get(f"{name}_energy", missing) for name in ("kinetic", "potential"))
-        if np.nan_to_num(run.history.get("surface", missing)).any() and potential.any():
+        if has_surface(run.history) and potential.any():
             curves = {"kinetic": kinetic, "potential": potential, "both": kinetic + potential}
             return [_panel("energy E / ρU²Dᵈ", curves)]
         return [_panel("kinetic energy E / ρU²Dᵈ", {"energy": kinetic})]
