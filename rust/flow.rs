@@ -5,6 +5,7 @@ use crate::base::parallel;
 use crate::boundary::Walls;
 use crate::forcing::BodyForce;
 use crate::frame::Frame;
+use crate::motion::{Moment, Motion};
 use crate::particles::Particles;
 use crate::settings::Settings;
 use crate::surface::Surface;
@@ -27,6 +28,8 @@ pub struct Flow<const D: usize> {
     pub walls: Walls<D>,
     pub before: Before<D>,
     pub body_force: BodyForce<D>,
+    /// Of rigid bodies.
+    pub motion: Motion<D>,
     /// Of the frame; of no particles if the fluid fills the domain.
     pub surface: Surface<D>,
 }
@@ -42,7 +45,8 @@ pub struct Before<const D: usize> {
 impl<const D: usize> Flow<D> {
     pub fn new(settings: &Settings, particles: Particles<D>) -> Self {
         let (frame, before, surface) = (Frame::default(), Before::default(), Surface::default());
-        Self { particles, frame, walls: Walls::new(settings), before, body_force: BodyForce::new(settings), surface }
+        let (body_force, motion) = (BodyForce::new(settings), Motion::new(settings));
+        Self { particles, frame, walls: Walls::new(settings), before, body_force, motion, surface }
     }
 
     /// Keep the state before a step, whose frame may stand in the middle of it.
@@ -57,18 +61,28 @@ impl<const D: usize> Flow<D> {
 
     /// Go back to the state before the step. Returns the particles with the velocities and pressures that it led to, where they stood before.
     pub fn restore(&mut self) -> Particles<D> {
-        let Self { particles, before, .. } = self;
+        let Self { particles, before, motion, .. } = self;
         particles.drop_images();
         particles.position.copy_from_slice(&before.position);
+        motion.place(Moment::Start, &mut particles.position, &mut particles.normal);
         let failed = particles.clone();
         particles.velocity.copy_from_slice(&before.velocity);
         particles.pressure.copy_from_slice(&before.pressure);
         failed
     }
 
-    /// r^{n+1} (12), for everything that moves with its velocity.
+    /// Solids of rigid bodies take the velocity that they have at n+1.
+    pub fn move_solids(&mut self) {
+        let Self { particles, frame, motion, .. } = self;
+        if !motion.is_none() {
+            motion.give_velocity(frame.images.real(&mut particles.velocity));
+            frame.images.fill(&mut particles.velocity);
+        }
+    }
+
+    /// r^{n+1} (12), for everything that moves.
     pub fn advance_positions(&mut self, step: Step) {
-        let Self { particles, frame, before, .. } = self;
+        let Self { particles, frame, before, motion, .. } = self;
         let mut position = std::mem::take(&mut particles.position);
         parallel::for_each(frame.images.real(&mut position), |i, r| {
             if !particles.is_fixed(i, &step.settings.bodies) {
@@ -76,8 +90,10 @@ impl<const D: usize> Flow<D> {
                 *r = before.position[i] + velocity * (0.5 * step.time_step);
             }
         });
+        motion.place(Moment::End, frame.images.real(&mut position), &mut particles.normal);
         frame.images.fill_positions(&mut position);
         particles.position = position;
+        frame.images.fill(&mut particles.normal);
     }
 }
 

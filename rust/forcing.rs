@@ -2,6 +2,7 @@
 
 use crate::base::{Error, Result, Vector};
 use crate::frame::Frame;
+use crate::motion::MotionRule;
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 
@@ -16,6 +17,8 @@ pub struct Forcing<const D: usize> {
     pub body_force: Option<Rule<D>>,
     /// Velocity of the surface above the solid particles of bodies that have none of their own.
     pub surface_velocity: Option<Rule<D>>,
+    /// Poses of the bodies that move, and are not free.
+    pub motion: Option<MotionRule>,
 }
 
 /// The body force per unit mass.
@@ -24,11 +27,18 @@ pub struct BodyForce<const D: usize> {
     constant: Vector<D>,
     /// What a rule adds, real particles and images; empty without.
     field: Vec<Vector<D>>,
+    /// Accelerations of solid particles, real ones; empty if none is accelerated.
+    pub walls: Vec<Vector<D>>,
 }
 
 impl<const D: usize> BodyForce<D> {
     pub fn new(settings: &Settings) -> Self {
-        Self { constant: Vector::from_column_slice(&settings.body_force), field: Vec::new() }
+        Self { constant: Vector::from_column_slice(&settings.body_force), field: Vec::new(), walls: Vec::new() }
+    }
+
+    /// Acceleration of solid particle `i`.
+    pub fn acceleration_of_wall(&self, i: usize) -> Vector<D> {
+        self.walls.get(i).copied().unwrap_or_else(Vector::zeros)
     }
 
     /// That on particle `i`.
@@ -58,7 +68,10 @@ impl<const D: usize> Forcing<D> {
             force.field.clear();
         }
         if let Some(rule) = &mut self.surface_velocity {
-            let own = |i: &usize| settings.bodies[particles.body[*i] as usize].velocity.is_none();
+            let own = |i: &usize| {
+                let body = &settings.bodies[particles.body[*i] as usize];
+                body.velocity.is_none() && !body.moves
+            };
             let solid = |i: &usize| particles.kind[*i] == ParticleKind::Solid;
             let solids: Vec<_> = (0..particles.real).filter(solid).filter(own).collect();
             // Of the surface above, not of the particle: one that turns is slower inside.

@@ -5,6 +5,7 @@ use crate::base::parallel::{self, CHUNK};
 use crate::discretisation::Stencil;
 use crate::faces::Faces;
 use crate::halo::Images;
+use crate::motion::{Moment, Motion};
 use crate::neighbours::Grid;
 use crate::particles::Particles;
 use crate::settings::{DerivativeFrame, Settings};
@@ -51,6 +52,18 @@ impl<const D: usize> Frame<D> {
     /// Create the images of the particles, search neighbours and evaluate the stencil. With `reorder` the particles are first
     /// put into cell order. If the derivatives will follow the particles, the list holds neighbours at r^n and at r^n + u^n Δt.
     pub fn search(&mut self, settings: &Settings, particles: &mut Particles<D>, travel: Travel, reorder: bool) {
+        self.search_around(settings, particles, travel, reorder, &mut Motion::default());
+    }
+
+    /// The same with bodies in `motion`, which stand where they are in the frame.
+    pub fn search_around(
+        &mut self,
+        settings: &Settings,
+        particles: &mut Particles<D>,
+        travel: Travel,
+        reorder: bool,
+        motion: &mut Motion<D>,
+    ) {
         let follows = settings.derivative_frame == DerivativeFrame::Updated;
         let lasts = follows && !settings.search_every_iteration;
         let moves = follows || travel.fraction > 0.0;
@@ -67,6 +80,7 @@ impl<const D: usize> Frame<D> {
             );
             particles.reorder(self.grid.order());
         }
+        motion.locate(particles);
         // Images that come within reach during the step, too.
         self.images.create(particles, &settings.domain, search_radius(settings) + 3.0 * distance);
         self.faces.find(particles);
@@ -79,8 +93,10 @@ impl<const D: usize> Frame<D> {
                     *r += particles.velocity[i] * (travel.fraction * travel.time_step);
                 }
             });
+            motion.place(Moment::Frame, self.images.real(&mut position), &mut particles.normal);
             self.images.fill_positions(&mut position);
             particles.position = position;
+            self.images.fill(&mut particles.normal);
         }
         self.expected.clear();
         if lasts {

@@ -16,6 +16,7 @@ pub mod halo;
 mod interpolation;
 pub mod kernel;
 pub mod loads;
+pub mod motion;
 pub mod neighbours;
 pub mod particles;
 pub mod poisson;

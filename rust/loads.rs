@@ -10,6 +10,7 @@ use crate::base::parallel;
 use crate::base::{ExactSum, Matrix, Vector};
 use crate::boundary::{Walls, surface_area};
 use crate::frame::Frame;
+use crate::motion::Motion;
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 
@@ -52,6 +53,13 @@ impl<const D: usize> Load<D> {
         }
     }
 
+    /// Force and torque.
+    pub fn total(&self) -> [nalgebra::Vector3<f64>; 2] {
+        let add = |a: [f64; 3], b: [f64; 3]| nalgebra::Vector3::from(a) + nalgebra::Vector3::from(b);
+        let force = add(components(&self.pressure_force), components(&self.viscous_force));
+        [force, add(self.pressure_torque, self.viscous_torque)]
+    }
+
     fn add_to(&self, sums: &mut Sums) {
         let forces = [&self.pressure_force, &self.viscous_force].map(components);
         let terms =
@@ -78,15 +86,16 @@ pub fn loads<const D: usize>(
     particles: &Particles<D>,
     frame: &Frame<D>,
     walls: &Walls<D>,
+    motion: &Motion<D>,
     pressure: impl Fn(usize) -> f64 + Sync,
 ) -> Vec<Load<D>> {
-    let centers: Vec<_> = settings.bodies.iter().map(|body| Vector::<D>::from_column_slice(&body.center)).collect();
+    let centers: Vec<_> = (0..settings.bodies.len()).map(|body| motion.center(body, &settings.bodies)).collect();
     let add = |sums: &mut Vec<Sums>, s: usize| {
         if particles.kind[s] == ParticleKind::Solid {
             sums.resize_with(centers.len(), Sums::default);
             let (pressure, viscous) = force_on(settings, particles, frame, walls, &pressure, s);
             let body = particles.body[s] as usize;
-            let arm = particles.position[s] - centers[body];
+            let arm = motion.arm(body, particles.position[s] - centers[body]);
             let (normal, velocity) = (&particles.normal[s], &particles.velocity[s]);
             let (surface, sliding) = (arm + normal * particles.depth[s], velocity - normal * velocity.dot(normal));
             Load::new(&arm, pressure, &surface, viscous, &sliding).add_to(&mut sums[body]);

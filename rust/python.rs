@@ -5,10 +5,11 @@ use crate::base::{Error, Matrix, Vector};
 use crate::forcing::{Forcing, Rule};
 use crate::kernel::KernelKind;
 use crate::loads::Load;
+use crate::motion::{MotionRule, NUMBERS, Pose};
 use crate::neighbours::Entry;
 use crate::particles::{ParticleKind, Particles, each_array};
 use crate::report::{Clock, Column, Report, columns};
-use crate::settings::Settings;
+use crate::settings::{Body, Settings};
 use crate::simulation::Simulation;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
@@ -79,10 +80,14 @@ impl PySimulation {
         let settings = Settings::from_json(settings)?;
         let threads = threads.map(read_threads).transpose()?;
         let clock = read_clock(state)?;
-        let engine = match settings.dimensions {
+        let mut engine = match settings.dimensions {
             2 => Engine::Two(Box::new(Simulation::new(settings, read_particles(state)?, clock, threads)?)),
             _ => Engine::Three(Box::new(Simulation::new(settings, read_particles(state)?, clock, threads)?)),
         };
+        if let Some(poses) = state.get_item("pose")? {
+            let poses = read_poses("pose", &poses)?;
+            engine!(&mut engine, s => s.set_poses(&poses))?;
+        }
         Ok(Self { engine, raised: Raised::default() })
     }
 
@@ -162,7 +167,7 @@ impl PySimulation {
 
     /// All that is needed to go on from here to the last bit.
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        engine!(&self.engine, s => state(py, s.particles(), s.clock()))
+        engine!(&self.engine, s => state(py, s))
     }
 
     /// Fluid ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d), quadratic moving least squares; NaN without neighbours.
@@ -194,13 +199,15 @@ impl PySimulation {
     }
 
     /// Ask functions, once a step, for a body force per unit mass beside that of the settings, and the velocity of surfaces that stay
-    /// in place: (m, d) from positions (m, d) and the time.
-    #[pyo3(signature = (forcing, sliding))]
-    fn prescribe(&mut self, forcing: Option<Py<PyAny>>, sliding: Option<Py<PyAny>>) {
+    /// in place: (m, d) from positions (m, d) and the time; and one for the poses (b, 18) of the b bodies that move and are not free, from
+    /// the time.
+    #[pyo3(signature = (forcing, sliding, motion))]
+    fn prescribe(&mut self, forcing: Option<Py<PyAny>>, sliding: Option<Py<PyAny>>, motion: Option<Py<PyAny>>) {
         let raised = &self.raised;
         engine!(&mut self.engine, s => s.forcing = Forcing {
             body_force: forcing.map(|function| rule("body force", function, Arc::clone(raised))),
             surface_velocity: sliding.map(|function| rule("surface velocity", function, Arc::clone(raised))),
+            motion: motion.map(|function| motion_rule(function, Arc::clone(raised))),
         });
     }
 }
@@ -218,14 +225,35 @@ fn rule<const D: usize>(name: &'static str, function: Py<PyAny>, raised: Raised)
     Box::new(move |position, time| {
         Python::attach(|py| {
             let values = function.call1(py, (vectors(py, position.iter().copied()), time));
-            values.and_then(|values| read_vectors(name, values.bind(py))).map_err(|error| {
-                if let Ok(mut raised) = raised.lock() {
-                    *raised = Some(error);
-                }
-                Error::Array { name, problem: "its function has failed".into() }
-            })
+            kept(name, &raised, values.and_then(|values| read_vectors(name, values.bind(py))))
         })
     })
+}
+
+fn motion_rule(function: Py<PyAny>, raised: Raised) -> MotionRule {
+    Box::new(move |time| {
+        Python::attach(|py| {
+            let poses = function.call1(py, (time,));
+            kept("motion", &raised, poses.and_then(|poses| read_poses("motion", poses.bind(py))))
+        })
+    })
+}
+
+/// What a function of the caller's has given. What it has raised is kept.
+fn kept<T>(name: &'static str, raised: &Raised, given: PyResult<T>) -> crate::Result<T> {
+    given.map_err(|error| {
+        if let Ok(mut raised) = raised.lock() {
+            *raised = Some(error);
+        }
+        Error::Array { name, problem: "its function has failed".into() }
+    })
+}
+
+fn read_poses(name: &'static str, array: &Bound<'_, PyAny>) -> PyResult<Vec<Pose>> {
+    let wrong = || array_error(name, format!("must be a float64 array of shape (bodies, {NUMBERS})"));
+    let array: PyReadonlyArray2<f64> = array.extract().map_err(|_| wrong())?;
+    let pose = |row: numpy::ndarray::ArrayView1<f64>| row.to_vec().try_into().map(Pose::from_numbers).map_err(|_| wrong());
+    array.as_array().rows().into_iter().map(pose).collect()
 }
 
 /// Bounds of Δt: ``courant``, ``penalty``, ``acoustic``, ``viscous``, ``body_force`` (inf where it does not apply), and ``lambda_max`` (λ_max Δx²).
@@ -387,8 +415,14 @@ fn read_clock(state: &Bound<'_, PyDict>) -> PyResult<Clock> {
     })
 }
 
-fn state<'py, const D: usize>(py: Python<'py>, particles: &Particles<D>, clock: Clock) -> PyResult<Bound<'py, PyDict>> {
+fn state<'py, const D: usize>(py: Python<'py>, simulation: &Simulation<D>) -> PyResult<Bound<'py, PyDict>> {
+    let (particles, clock) = (simulation.particles(), simulation.clock());
     let dict = PyDict::new(py);
+    if simulation.settings().bodies.iter().any(Body::is_rigid) {
+        let poses = simulation.poses();
+        let numbers = PyArray1::from_iter(py, poses.iter().flat_map(Pose::numbers));
+        dict.set_item("pose", numbers.reshape([poses.len(), NUMBERS])?)?;
+    }
     each_array!(particles, (&) array, name => dict.set_item(name, Exchanged::write(py, &array[..particles.real]))?);
     dict.set_item("time", clock.time)?;
     dict.set_item("step", clock.step)?;
@@ -402,7 +436,7 @@ fn snapshot<'py, const D: usize>(
     simulation: &mut Simulation<D>,
 ) -> PyResult<(Bound<'py, PyDict>, Vec<Matrix<D>>)> {
     let snapshot = py.detach(|| simulation.snapshot());
-    let dict = state(py, simulation.particles(), simulation.clock())?;
+    let dict = state(py, simulation)?;
     let divergence: Vec<f64> = snapshot.velocity_gradient.iter().map(|gradient| gradient.trace()).collect();
     dict.set_item("volume", snapshot.volume.into_pyarray(py))?;
     dict.set_item("velocity_divergence", divergence.into_pyarray(py))?;
@@ -429,6 +463,11 @@ fn history<'py, const D: usize>(py: Python<'py>, reports: &[Report<D>], bodies: 
         let values = reports.iter().flat_map(|r| r.loads.iter().flat_map(of)).collect::<Vec<_>>();
         dict.set_item(name, PyArray1::from_vec(py, values).reshape([reports.len(), bodies, width])?)
     };
+    let of_poses = |name: &str, start: usize, width: usize, of: &dyn Fn(&Pose) -> Vector<3>| {
+        let of = |pose: &Pose| of(pose).as_slice()[start..start + width].to_vec();
+        let values = reports.iter().flat_map(|r| r.poses.iter().flat_map(of)).collect::<Vec<_>>();
+        dict.set_item(name, PyArray1::from_vec(py, values).reshape([reports.len(), bodies, width])?)
+    };
     let spin = if D == 2 { 1 } else { 3 };
     for (name, column) in columns() {
         match column {
@@ -437,6 +476,8 @@ fn history<'py, const D: usize>(py: Python<'py>, reports: &[Report<D>], bodies: 
             Column::Flag(of) => dict.set_item(name, PyArray1::from_iter(py, reports.iter().map(of)))?,
             Column::Force(of) => of_bodies(name, D, &|load| of(load).iter().copied().collect())?,
             Column::Torque(of) => of_bodies(name, spin, &|load| of(load)[3 - spin..].to_vec())?,
+            Column::Way(of) => of_poses(name, 0, D, &of)?,
+            Column::Turn(of) => of_poses(name, 3 - spin, spin, &of)?,
         }
     }
     Ok(dict)

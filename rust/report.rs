@@ -4,6 +4,7 @@ use crate::base::{Vector, exact_sums, parallel};
 use crate::discretisation::Stencil;
 use crate::flow::{Flow, Step};
 use crate::loads::Load;
+use crate::motion::Pose;
 use crate::particles::{ParticleKind, Particles};
 use crate::scheme::Outcome;
 use crate::settings::{Boundary, Settings};
@@ -46,6 +47,8 @@ pub struct Report<const D: usize> {
     /// Particles at a free surface, and those that are alone.
     pub places: [usize; 2],
     pub loads: Vec<Load<D>>,
+    /// Where each body is at the end of the step, and how fast it moves, if it does as a rigid one.
+    pub poses: Vec<Pose>,
 }
 
 /// How closely the fluid particles lie: their number density Σ W over that of the undisturbed lattice, 1 where the density of the fluid
@@ -67,11 +70,15 @@ pub enum Column<const D: usize> {
     Force(fn(&Load<D>) -> Vector<D>),
     /// Three components for each body, of which the last alone says something in 2-D.
     Torque(fn(&Load<D>) -> [f64; 3]),
+    /// A vector of each body's motion.
+    Way(fn(&Pose) -> nalgebra::Vector3<f64>),
+    /// Likewise of its rotation, with the components of a torque.
+    Turn(fn(&Pose) -> nalgebra::Vector3<f64>),
 }
 
 /// The columns of the history: the one list of them.
 pub fn columns<const D: usize>() -> Vec<(&'static str, Column<D>)> {
-    use Column::{Count, Flag, Force, Number, Torque};
+    use Column::{Count, Flag, Force, Number, Torque, Turn, Way};
     vec![
         ("time", Number(|r| r.clock.time)),
         ("time_step", Number(|r| r.time_step)),
@@ -104,6 +111,10 @@ pub fn columns<const D: usize>() -> Vec<(&'static str, Column<D>)> {
         ("viscous_force", Force(|load| load.viscous_force)),
         ("pressure_torque", Torque(|load| load.pressure_torque)),
         ("viscous_torque", Torque(|load| load.viscous_torque)),
+        ("displacement", Way(|pose| pose.displacement)),
+        ("velocity", Way(|pose| pose.velocity)),
+        ("angle", Turn(|pose| pose.angle)),
+        ("angular_velocity", Turn(|pose| pose.spin)),
     ]
 }
 
@@ -142,6 +153,7 @@ impl<const D: usize> Report<D> {
             counts: [0; 4],
             places: [0; 2],
             loads,
+            poses: Vec::new(),
         }
     }
 }

@@ -12,6 +12,7 @@ use crate::forcing::Forcing;
 use crate::frame::Travel;
 use crate::interpolation::interpolate;
 use crate::loads::loads;
+use crate::motion::{NUMBERS, Pose};
 use crate::neighbours::Grid;
 use crate::particles::{ParticleKind, Particles, is_late, lineage};
 use crate::report::{Clock, Report, dissipation, potential_energy};
@@ -107,6 +108,21 @@ impl<const D: usize> Simulation<D> {
         self.flow.frame.images.poisons = on;
     }
 
+    /// The poses of the bodies, which free ones go on with through a restart; see [`Simulation::set_poses`].
+    pub fn poses(&self) -> Vec<Pose> {
+        self.flow.motion.poses()
+    }
+
+    /// Go on with free bodies in such poses, one for each body; before the first step.
+    pub fn set_poses(&mut self, poses: &[Pose]) -> Result<()> {
+        if poses.len() != self.settings.bodies.len() || !poses.iter().flat_map(Pose::numbers).all(f64::is_finite) {
+            let problem = format!("must hold {NUMBERS} finite numbers for each of {} bodies", self.settings.bodies.len());
+            return Err(Error::Array { name: "pose", problem });
+        }
+        self.flow.motion.set_poses(poses);
+        Ok(())
+    }
+
     pub fn threads(&self) -> usize {
         self.pool.current_num_threads()
     }
@@ -147,15 +163,20 @@ impl<const D: usize> Simulation<D> {
 
     /// One time step: the stages of the method in order.
     fn step(&mut self) -> Result<()> {
+        let Flow { particles, motion, .. } = &mut self.flow;
+        motion.start(&self.settings, particles, &mut self.forcing.motion, self.clock.time)?;
         let velocity_max = self.velocity_max();
         let time_step = self.time_step(velocity_max)?;
-        self.prepare_step(Travel { time_step, velocity_max, fraction: self.settings.derivative_frame.fraction() });
+        let fraction = self.settings.derivative_frame.fraction();
+        self.flow.motion.advance(&mut self.forcing.motion, self.clock.time, time_step, fraction)?;
+        self.prepare_step(Travel { time_step, velocity_max, fraction });
         let step = Step { settings: &self.settings, time_step, velocity_max };
         let (flow, scheme) = (&mut self.flow, &mut self.scheme);
         if step.settings.free_surface.is_some() {
             flow.surface.find(step.settings, &flow.particles, &mut flow.frame);
         }
-        let Flow { particles, frame, body_force, .. } = &mut *flow;
+        let Flow { particles, frame, body_force, motion, .. } = &mut *flow;
+        motion.accelerations(particles.real, &mut body_force.walls);
         let middle = self.clock.time + 0.5 * time_step;
         let prescribed = self.forcing.apply(step.settings, particles, frame, body_force, middle);
         flow.remember();
@@ -173,7 +194,7 @@ impl<const D: usize> Simulation<D> {
             return Err(error);
         }
         let acting = |i: usize| scheme.acting_pressure(step, &flow.particles, i);
-        let loads = loads(step.settings, &flow.particles, &flow.frame, &flow.walls, acting);
+        let loads = loads(step.settings, &flow.particles, &flow.frame, &flow.walls, &flow.motion, acting);
         let dissipated = dissipation(step, flow, &loads, |i| scheme.viscous_laplacian(step, i));
         let mut report = Report::new(step, &flow.particles, &flow.frame.stencil, scheme.penalty(time_step), loads);
         report.dissipation = dissipated;
@@ -186,6 +207,9 @@ impl<const D: usize> Simulation<D> {
         let divergence = |i: usize| if measured { self.change[i].divergence } else { scheme.divergence(i) };
         report.outcome = Outcome::new(step.settings, particles, solved, divergence);
         self.end_step(time_step);
+        let loads = &report.loads;
+        self.flow.motion.end(&self.settings.body_force, |body| loads[body].total());
+        report.poses = self.flow.motion.poses();
         report.clock = self.clock;
         report.counts = self.flow.particles.counts();
         report.places = self.flow.surface.counts();
@@ -213,7 +237,8 @@ impl<const D: usize> Simulation<D> {
 
     fn search(&mut self, travel: Travel) {
         let reorder = self.clock.step.is_multiple_of(STEPS_BETWEEN_SORTS);
-        self.flow.frame.search(&self.settings, &mut self.flow.particles, travel, reorder);
+        let Flow { particles, frame, motion, .. } = &mut self.flow;
+        frame.search_around(&self.settings, particles, travel, reorder, motion);
     }
 
     /// Boundary crossings and clock.
@@ -250,7 +275,8 @@ impl<const D: usize> Simulation<D> {
             let symptom = Symptom { particle: fastest.unwrap_or(0), field: "velocity", value: velocity_max };
             return Err(self.diverged(symptom, fastest_waves, velocity_max));
         }
-        Ok(settings.time_step.min(fastest_waves).min(limits.viscous).min(limits.body_force))
+        let bodies = settings.acceleration_limit(self.flow.motion.acceleration());
+        Ok(settings.time_step.min(fastest_waves).min(limits.viscous).min(limits.body_force).min(bodies))
     }
 
     fn diverged(&self, symptom: Symptom, time_step: f64, velocity_max: f64) -> Error {

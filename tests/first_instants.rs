@@ -4,6 +4,7 @@ use alsph::boundary::{Walls, add_wall_flux, extend_pressure};
 use alsph::discretisation::{Divergence, Gradient};
 use alsph::forcing::BodyForce;
 use alsph::loads::loads;
+use alsph::motion::Motion;
 use alsph::settings::{Boundary, Settings, Solver};
 use alsph::{Clock, ParticleKind, Particles, Simulation, Vector};
 use common::set::Set;
@@ -94,7 +95,8 @@ fn start(side: usize, disorder: f64) -> [f64; 3] {
     let (mut set, exact) = (Set::of(particles, &settings, true), Array::new());
     let velocity = project(&settings, &mut set, Vector::from([1.0, 0.0]));
     let Set { particles, frame } = &set;
-    let load = loads(&settings, particles, frame, &Walls::new(&settings), |i| particles.pressure[i])[0].pressure_force[0];
+    let load = loads(&settings, particles, frame, &Walls::new(&settings), &Motion::default(), |i| particles.pressure[i])[0]
+        .pressure_force[0];
     let impulse = load / (PI * common::RADIUS.powi(2));
     let mut sums = [[0.0; 2]; 2];
     let mut add = |k: usize, value: f64, exact: f64| {

@@ -59,7 +59,7 @@ fn what_a_rule_gives_everywhere_is_what_the_settings_give() {
             (scheme.clone(), wall_pressure.into(), false.into());
         let mut told = simulation(common::parse(&value), &particles, Forcing::default());
         (value["body_force"], value["bodies"][0]["velocity"]) = (json!([0.0, 0.0]), Value::Null);
-        let rules = Forcing { body_force: everywhere(FORCE), surface_velocity: everywhere([LID, 0.0]) };
+        let rules = Forcing { body_force: everywhere(FORCE), surface_velocity: everywhere([LID, 0.0]), motion: None };
         let mut asked = simulation(common::parse(&value), &particles, rules);
         let mut still = simulation(common::parse(&value), &particles, Forcing::default());
         for simulation in [&mut told, &mut asked, &mut still] {
@@ -75,7 +75,7 @@ fn a_rule_that_is_taken_away_acts_no_more() {
     let (value, particles) = channel();
     let mut simulations = [Some(()), None].map(|pushed| {
         let body_force = pushed.and_then(|()| everywhere([0.0, 0.0]));
-        simulation(common::parse(&value), &particles, Forcing { body_force, surface_velocity: None })
+        simulation(common::parse(&value), &particles, Forcing { body_force, surface_velocity: None, motion: None })
     });
     let [pushed, plain] = &mut simulations;
     pushed.advance(3, None).expect("stable");
@@ -93,7 +93,9 @@ fn a_rule_that_is_taken_away_acts_no_more() {
 
     let mut value = value;
     value["adaptive_time_step"] = false.into();
-    let still = |body_force| simulation(common::parse(&value), &particles, Forcing { body_force, surface_velocity: None });
+    let still = |body_force| {
+        simulation(common::parse(&value), &particles, Forcing { body_force, surface_velocity: None, motion: None })
+    };
     let (mut pushed, mut plain) = (still(everywhere([5.0, 0.0])), still(None));
     pushed.advance(1, None).expect("stable");
     pushed.forcing.body_force = None;
@@ -119,7 +121,7 @@ fn a_force_that_changes_in_time_is_integrated_at_second_order() {
         (value["time_step"], value["adaptive_time_step"]) = ((1.0 / steps as f64).into(), false.into());
         value["penalty_constant"] = 1.0.into();
         let rule: Rule<2> = Box::new(|position, time| Ok(vec![Vector::from([time.cos(), 0.0]); position.len()]));
-        let forcing = Forcing { body_force: Some(rule), surface_velocity: None };
+        let forcing = Forcing { body_force: Some(rule), surface_velocity: None, motion: None };
         let mut simulation = simulation(common::parse(&value), &common::particles(common::lattice::<2>(8, 0.0)), forcing);
         simulation.advance(steps, None).expect("stable");
         (simulation.particles().velocity[0][0] - 1f64.sin()).abs()

@@ -2,6 +2,7 @@
 
 use alsph::boundary::{Walls, surface_area};
 use alsph::loads::{Load, loads};
+use alsph::motion::Motion;
 use alsph::{Clock, ParticleKind, Particles, Settings, Simulation, Vector};
 use approx::assert_relative_eq;
 use common::set::Set;
@@ -93,7 +94,7 @@ fn seen<const D: usize>(settings: &Settings, set: &Set<D>) -> (Vec<Vec<f64>>, Lo
     let Set { particles, frame } = set;
     let mut walls = Walls::new(settings);
     walls.see(settings, particles, frame);
-    let load = loads(settings, particles, frame, &walls, |i| particles.pressure[i])[0];
+    let load = loads(settings, particles, frame, &walls, &Motion::default(), |i| particles.pressure[i])[0];
     walls.sharpen(settings, particles, frame, |i| particles.velocity[i] * particles.position[i][0], 1.0);
     let mut order: Vec<usize> = (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Solid).collect();
     order.sort_by_key(|&i| particles.id[i]);

@@ -312,7 +312,8 @@ fn outcome<const D: usize>(
         let mut simulation = Simulation::new(settings.clone(), particles, clock, Some(threads))?;
         simulation.poison(cut.is_some());
         if prescribes(configuration) {
-            simulation.forcing = Forcing { body_force: Some(Box::new(wave)), surface_velocity: Some(Box::new(wave)) };
+            simulation.forcing =
+                Forcing { body_force: Some(Box::new(wave)), surface_velocity: Some(Box::new(wave)), ..Forcing::default() };
         }
         Ok(simulation)
     };

@@ -6,6 +6,7 @@ use alsph::flow::{Before, Flow, Step};
 use alsph::forcing::BodyForce;
 use alsph::frame::{Frame, Travel};
 use alsph::kernel::{QuinticSpline, Smoothing};
+use alsph::motion::Motion;
 use alsph::neighbours::Grid;
 use alsph::scheme::{Alsph, Outcome, Scheme};
 use alsph::settings::{SweepPressure, SweepWeights, WallPressure};
@@ -271,6 +272,7 @@ fn first_flow(settings: &Settings, start: Particles<2>) -> Flow<2> {
         before: Before::default(),
         body_force: BodyForce::new(settings),
         surface: Surface::default(),
+        motion: Motion::default(),
     }
 }
 
@@ -291,7 +293,7 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
         for _ in 0..2 {
             flow.remember();
             let solved = scheme.solve(step, &mut flow);
-            let Flow { particles, frame, walls, before, body_force, surface } = flow;
+            let Flow { particles, frame, walls, before, body_force, surface, motion } = flow;
             let acting: Vec<_> = (0..particles.len()).map(|i| scheme.acting_pressure(step, &particles, i)).collect();
             let seen = acting.iter().zip(&particles.pressure).any(|(acting, p)| (acting - p).abs() > 1e-3);
             assert!(seen, "nothing to be seen");
@@ -305,7 +307,7 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
             assert_relative_eq!(outcome.divergence_max, divergence.clone().fold(0.0, f64::max), epsilon = 1e-12);
             assert_relative_eq!(outcome.divergence_sum, divergence.sum::<f64>(), max_relative = 1e-9);
             let Set { particles, frame } = set;
-            flow = Flow { particles, frame, walls, before, body_force, surface };
+            flow = Flow { particles, frame, walls, before, body_force, surface, motion };
         }
     }
 }

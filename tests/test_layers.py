@@ -16,6 +16,7 @@ FLOORS = (
     ("particles",),
     ("halo", "neighbours"),
     ("discretisation", "faces"),
+    ("motion",),
     ("frame",),
     ("surface",),
     ("forcing",),

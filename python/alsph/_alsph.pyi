@@ -73,8 +73,12 @@ class Simulation:
         self,
         forcing: Callable[[NDArray[np.float64], float], NDArray[np.float64]] | None,
         sliding: Callable[[NDArray[np.float64], float], NDArray[np.float64]] | None,
+        motion: Callable[[float], NDArray[np.float64]] | None,
     ) -> None:
-        """Ask functions, once a step, for a body force and the velocity of surfaces: (m, d) from positions and time."""
+        """Ask functions for a body force and the velocity of surfaces: (m, d) from positions and time, once a step.
+
+        And for the poses (b, 18) of the bodies that move and are not free, from the time.
+        """
 
     def set_inflow(self, velocity: NDArray[np.float64]) -> None:
         """Prescribe the velocity of the inlet buffer particles, (d,) or (m, d) in the order of `inflow_position`."""

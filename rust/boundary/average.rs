@@ -32,19 +32,19 @@ pub fn shepard<const D: usize, const N: usize>(
     (total > 0.0).then(|| sum.map(|s| s / total))
 }
 
-/// Give each solid particle of `field` the Shepard average of what `at(field, j, r_ij)` says of the flowing neighbours, as `of` makes it
+/// Give each solid particle i of `field` the Shepard average of what `at(field, i, j, r_ij)` says of the flowing neighbours, as `of` makes it
 /// of N numbers; of zeros without neighbours. `kind` is that of the real particles. Images are renewed before and after.
 fn extrapolate<T: Mirrored<D> + Poison, const D: usize, const N: usize>(
     settings: &Settings,
     frame: &Frame<D>,
     kind: &[ParticleKind],
     field: &mut [T],
-    at: impl Fn(&[T], usize, Vector<D>) -> [f64; N] + Sync,
+    at: impl Fn(&[T], usize, usize, Vector<D>) -> [f64; N] + Sync,
     of: impl Fn([f64; N]) -> T + Sync,
 ) {
     frame.images.fill(field);
     let values = &*field;
-    let average = |i| of(shepard(settings, &frame.stencil, i, |j, r_ij| at(values, j, r_ij)).unwrap_or([0.0; N]));
+    let average = |i| of(shepard(settings, &frame.stencil, i, |j, r_ij| at(values, i, j, r_ij)).unwrap_or([0.0; N]));
     let solids = (0..kind.len()).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
     let extrapolated: Vec<(usize, T)> = solids.map(|i| (i, average(i))).collect();
     if !extrapolated.is_empty() {
@@ -56,7 +56,7 @@ fn extrapolate<T: Mirrored<D> + Poison, const D: usize, const N: usize>(
 
 /// Solid particles show the mean of what the fluid around them has: ∂/∂n = 0.
 pub fn extrapolate_scalar<const D: usize>(settings: &Settings, frame: &Frame<D>, kind: &[ParticleKind], field: &mut [f64]) {
-    extrapolate(settings, frame, kind, field, |field, j, _| [field[j]], |[mean]| mean);
+    extrapolate(settings, frame, kind, field, |field, _, j, _| [field[j]], |[mean]| mean);
 }
 
 /// [`extrapolate_scalar`] of a vector.
@@ -66,7 +66,7 @@ pub fn extrapolate_vector<const D: usize>(
     kind: &[ParticleKind],
     field: &mut [Vector<D>],
 ) {
-    extrapolate(settings, frame, kind, field, |field, j, _| field[j].into(), Vector::<D>::from);
+    extrapolate(settings, frame, kind, field, |field, _, j, _| field[j].into(), Vector::<D>::from);
 }
 
 /// Renew the pressure of images and solids from that of the fluid. `gradient` is memory to be used.
@@ -86,8 +86,8 @@ pub fn extend_pressure<const D: usize>(
     extrapolate_pressure(settings, frame, particles, gradient, body_force);
 }
 
-/// The pressure of solid particles: the Shepard average of the fluid's, with the hydrostatic term (Adami, Hu and Adams 2012, eq. 27; bodies
-/// do not accelerate) or continued along its `gradient`, which only the rule [`WallPressure::Linear`] reads.
+/// The pressure of solid particles: the Shepard average of the fluid's, with the hydrostatic term less the body's acceleration (Adami, Hu and
+/// Adams 2012, eq. 27) or continued along its `gradient`, which only the rule [`WallPressure::Linear`] reads.
 pub fn extrapolate_pressure<const D: usize>(
     settings: &Settings,
     frame: &Frame<D>,
@@ -96,8 +96,10 @@ pub fn extrapolate_pressure<const D: usize>(
     body_force: &BodyForce<D>,
 ) {
     let linear = settings.wall_pressure == WallPressure::Linear;
-    let slope = |j: usize| if linear { gradient[j] } else { body_force.at(j) * settings.density };
-    let continued = |pressure: &[f64], j: usize, r_ij: Vector<D>| [pressure[j] + slope(j).dot(&r_ij)];
+    let slope = |i: usize, j: usize| {
+        if linear { gradient[j] } else { (body_force.at(j) - body_force.acceleration_of_wall(i)) * settings.density }
+    };
+    let continued = |pressure: &[f64], i: usize, j: usize, r_ij: Vector<D>| [pressure[j] + slope(i, j).dot(&r_ij)];
     extrapolate(settings, frame, &kind[..*real], pressure, continued, |[pressure]| pressure);
 }
 

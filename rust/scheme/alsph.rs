@@ -80,6 +80,7 @@ impl<const D: usize> Scheme<D> for Alsph<D> {
         self.begin(flow);
         self.velocity_derivatives(step, flow);
         self.begin_viscous_term(step, flow);
+        flow.move_solids();
         for iteration in 1.. {
             self.predict_velocity(step, flow); // (8)
             self.update_pressure(step, flow); // (10) (20)
@@ -203,6 +204,7 @@ impl<const D: usize> Alsph<D> {
 
     /// u* (8), and ∇²p^m for (10), which reads the same neighbours.
     fn predict_velocity(&mut self, step: Step, Flow { particles, frame, before, body_force, .. }: &Flow<D>) {
+        let velocity = &particles.velocity;
         let (dt, viscosity) = (step.time_step, step.settings.kinematic_viscosity);
         let condition = conditions(step.settings);
         let (initial, r_al) = (&before.velocity, self.coefficients.penalty);
@@ -214,7 +216,7 @@ impl<const D: usize> Alsph<D> {
             |i, (penalty, p), star, pressure_laplacian| {
                 *pressure_laplacian = p;
                 *star = match condition(particles.kind[i], &particles.position[i]).pressure {
-                    PressureRule::Zero | PressureRule::FromFluid => initial[i],
+                    PressureRule::Zero | PressureRule::FromFluid => velocity[i],
                     PressureRule::Solved | PressureRule::SolvedWithoutDivergence => {
                         initial[i]
                             + (penalty * r_al + viscous_laplacian(derived, explicit, step, i) * viscosity + body_force.at(i))

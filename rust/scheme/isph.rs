@@ -136,7 +136,7 @@ impl<const D: usize> Isph<D> {
         if share > 0.0 {
             self.extend_pressure(step.settings, flow);
         }
-        let Flow { particles, frame, body_force, .. } = flow;
+        let Flow { particles, frame, body_force, motion, .. } = flow;
         frame.images.blank(&mut self.base, particles.len());
         parallel::for_each(&mut self.base, |i, p| *p = if share > 0.0 { share * particles.pressure[i] } else { 0.0 });
         frame.images.blank(&mut self.velocity_star, particles.len());
@@ -155,6 +155,7 @@ impl<const D: usize> Isph<D> {
         } else {
             parallel::for_each(out, |i, out| *out = star(i, Vector::zeros()));
         }
+        motion.give_velocity(frame.images.real(&mut self.velocity_star));
         frame.images.fill(&mut self.velocity_star);
     }
 
@@ -218,6 +219,7 @@ impl<const D: usize> Scheme<D> for Isph<D> {
         self.constrain_density(step, &flow.frame.stencil.volume);
         self.predict_velocity(step, flow);
         self.form_source(step, flow);
+        flow.move_solids();
         let Flow { particles, frame, .. } = &mut *flow;
         let share = self.pressure_share;
         frame.images.blank(&mut self.change, particles.len());

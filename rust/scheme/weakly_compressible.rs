@@ -126,6 +126,7 @@ impl<const D: usize> Scheme<D> for WeaklyCompressible<D> {
         self.advance_pressure(step, flow);
         self.extend_pressure(step.settings, flow);
         self.advance_velocity(step, flow);
+        flow.move_solids();
         let velocity = &flow.particles.velocity;
         flow.frame.stencil.for_each_one(Divergence(velocity), &mut self.divergence, |_, value, out| *out = value);
         self.advance_pressure(step, flow);

@@ -38,8 +38,63 @@ pub struct Body {
     /// the beginning, as on a belt.
     #[serde(default)]
     pub belt: Option<[f64; 2]>,
-    /// Point that the torque is taken about. It stays where it is when the body moves.
+    /// Point that the torque is taken about, and that a rigid body turns about; a body with a `velocity` leaves it where it is.
     pub center: Vec<f64>,
+    /// What a body is that the fluid moves. One that moves with neither this nor a `velocity` is moved by a rule.
+    #[serde(default)]
+    pub rigid: Option<Rigid>,
+}
+
+/// A rigid body that moves freely. Vectors have one entry a direction.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rigid {
+    pub mass: f64,
+    /// Moment of inertia about the centre of mass, which is the body's `center`; in 3-D the nine entries of the tensor.
+    pub inertia: Vec<f64>,
+    /// A constant force beside the fluid's and the body force.
+    pub force: Vec<f64>,
+    /// Of springs and dampers to where the body was at the start.
+    pub stiffness: Vec<f64>,
+    pub damping: Vec<f64>,
+    /// Along which directions, and then about which axes (one in 2-D), it can move.
+    pub free: Vec<bool>,
+    /// About what the fluid that it drags along adds to mass and inertia; no result depends on it where the motion is smooth.
+    pub added_mass: f64,
+    pub added_inertia: f64,
+}
+
+impl Body {
+    /// Whether it moves as a rigid body, by a rule or freely.
+    pub fn is_rigid(&self) -> bool {
+        self.moves && self.velocity.is_none()
+    }
+}
+
+impl Rigid {
+    fn validate(&self, name: &str, dimensions: usize) -> Result<()> {
+        let refuse = |key: &str, problem: &str| Err(setting(format!("bodies.{name}.rigid.{key}"), problem));
+        let turns = if dimensions == 2 { 1 } else { 3 };
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        if !positive(self.mass) {
+            return refuse("mass", "must be a positive number");
+        }
+        if self.inertia.len() != turns * turns || !(0..turns).all(|k| positive(self.inertia[k * turns + k])) {
+            return refuse("inertia", "must be a positive number in 2-D, the nine of a tensor in 3-D");
+        }
+        if self.free.len() != dimensions + turns {
+            return refuse("free", "must say of each direction and axis whether the body can move so");
+        }
+        for (key, value) in [("added_mass", self.added_mass), ("added_inertia", self.added_inertia)] {
+            if !(value.is_finite() && value >= 0.0) {
+                return refuse(key, "must be a number not below zero");
+            }
+        }
+        for (key, vector) in [("force", &self.force), ("stiffness", &self.stiffness), ("damping", &self.damping)] {
+            validate_vector(&format!("bodies.{name}.rigid.{key}"), vector, dimensions)?;
+        }
+        Ok(())
+    }
 }
 
 impl Domain {
@@ -73,11 +128,18 @@ pub(super) fn validate_bodies(bodies: &[Body], dimensions: usize) -> Result<()> 
         let name = format!("bodies.{}.velocity", body.name);
         match &body.velocity {
             Some(velocity) => validate_vector(&name, velocity, dimensions)?,
-            None if body.moves => return Err(setting(name, "must be given for a body that moves")),
             None => {}
         }
         validate_vector(&format!("bodies.{}.center", body.name), &body.center, dimensions)?;
-        if body.belt.is_some_and(|[from, to]| !(body.moves && from.is_finite() && to.is_finite() && from < to)) {
+        if let Some(rigid) = &body.rigid {
+            if !body.is_rigid() {
+                return Err(setting(format!("bodies.{}.rigid", body.name), "needs a body that moves, and no velocity"));
+            }
+            rigid.validate(&body.name, dimensions)?;
+        }
+        if body.belt.is_some_and(|[from, to]| {
+            !(body.velocity.is_some() && body.moves && from.is_finite() && to.is_finite() && from < to)
+        }) {
             return Err(setting(
                 format!("bodies.{}.belt", body.name),
                 "must be two numbers, the lower one first, of a body that moves",

@@ -34,8 +34,13 @@ impl Settings {
             penalty: self.penalty_constant.map_or(f64::INFINITY, |constant| spacing / wave(constant)),
             acoustic: self.acoustic_limit(velocity_max, largest),
             viscous: self.viscous_limit() * h * h / self.kinematic_viscosity,
-            body_force: 0.25 * (h / gravity).sqrt(),
+            body_force: self.acceleration_limit(gravity),
         }
+    }
+
+    /// Largest Δt where something has such an acceleration: 0.25 sqrt(h/a).
+    pub fn acceleration_limit(&self, acceleration: f64) -> f64 {
+        0.25 * (self.smoothing_length() / acceleration).sqrt()
     }
 
     fn acoustic_limit(&self, velocity_max: f64, largest: Eigenvalues) -> f64 {

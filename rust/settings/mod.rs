@@ -10,7 +10,7 @@ mod lattice;
 mod limits;
 mod rules;
 
-pub use domain::{Body, Boundary, Domain};
+pub use domain::{Body, Boundary, Domain, Rigid};
 pub use lattice::Eigenvalues;
 pub use limits::TimeStepLimits;
 pub use rules::{
@@ -176,6 +176,9 @@ impl Settings {
         self.validate_free_surface()?;
         domain::validate_vector("body_force", &self.body_force, self.dimensions)?;
         domain::validate_bodies(&self.bodies, self.dimensions)?;
+        if self.wall_pressure == WallPressure::Paper && self.bodies.iter().any(Body::is_rigid) {
+            return Err(setting("wall_pressure", "must be \"linear\" or \"adami\" where bodies move by a rule or freely"));
+        }
         self.domain.validate(self.dimensions, self.support_radius())
     }
 

@@ -24,6 +24,7 @@ from alsph.engine.output import Output
 from alsph.engine.problem import Problem
 from alsph.engine.simulation import Simulation, bytes_per_particle, time_step_limits
 from alsph.errors import ConfigError
+from alsph.geometry.domain import SolidBody
 from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
 from alsph.memory import check
@@ -240,11 +241,20 @@ class Case(Driven):
             "body_force": self.body_force(),
             "time_step": self.largest_time_step * self.particle_spacing,
             "domain": self.checked_domain.settings(),
-            "bodies": [
-                body.settings() | ({"velocity": None} if "sliding" in self.rules and not body.moves else {})
-                for body in self.checked_bodies
-            ],
+            "bodies": [body.settings() | self._ruled(body) for body in self.checked_bodies],
         }
+
+    def _ruled(self, body: SolidBody) -> dict[str, Any]:
+        """Return what is to be changed in the settings of a body that a rule tells of."""
+        if "motion" in self.rules and body.name in self.moved_bodies:
+            return {"velocity": None, "moves": True}
+        return {"velocity": None} if "sliding" in self.rules and not body.moves else {}
+
+    @property
+    def moved_bodies(self) -> list[str]:
+        """Names of the bodies that :meth:`motion` moves."""
+        told = [body.name for body in self.checked_bodies if body.moves and body.velocity is None]
+        return told or list(self.coefficient_bodies)
 
     def build(self, threads: int | None = None) -> Problem:
         """Return the problem that the engine starts from.

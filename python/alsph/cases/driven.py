@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from abc import abstractmethod
 from functools import cached_property
 from typing import ClassVar, Self
@@ -19,7 +20,12 @@ from alsph.expressions import VectorExpression
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.text import shown
 
-RULES = {"inflow": "inlet_velocity", "forcing": "driving_force", "sliding": "surface_velocity"}
+RULES = {
+    "inflow": "inlet_velocity",
+    "forcing": "driving_force",
+    "sliding": "surface_velocity",
+    "motion": "body_motion",
+}
 """What a case may prescribe by place and time: a method in Python, and the parameter that holds an expression."""
 
 
@@ -41,6 +47,12 @@ class Driven(Dimensional):
     surface_velocity: str | None = Field(
         default=None,
         description="velocity of the surfaces of bodies in place, by place and time, as '-2*y, 2*(x - 4)' [U]",
+    )
+
+    body_motion: str | None = Field(
+        default=None,
+        description="how far bodies have come by time, in 2-D also how far they have turned, as "
+        "'-0.8*sin(2*pi*t/5), 0, 0.1*t'; x and y are those of their centres at the start [D, rad]",
     )
 
     @model_validator(mode="after")
@@ -141,6 +153,28 @@ class Driven(Dimensional):
         """
         return self._given("surface_velocity", position, time)
 
+    def motion(self, position: FloatArray, time: float) -> ArrayLike | None:
+        """Return how far bodies have come and turned, which is asked for in every step.
+
+        By default it is ``body_motion``, if that is given. It moves those of :meth:`bodies` that say ``moves=True`` and
+        ``velocity=None``, and if none does those whose forces are reported.
+
+        Parameters
+        ----------
+        position
+            Centres of bodies at the start (b, d) [D].
+        time
+            Any time [D/U], also a little before 0.
+
+        Returns
+        -------
+        array
+            Displacements (b, d), or (d,) for all, from where they are drawn, with what it gives at the time 0 taken off
+            [D]; or with the angles behind them that they have turned about their centres, (b, 3) in 2-D and as rotation
+            vectors (b, 6) in 3-D [rad].
+        """
+        return self._given("body_motion", position, time)
+
     def _given(self, name: str, position: FloatArray, time: float) -> FloatArray | None:
         expression = self._expressions.get(name)
         return expression(position, time) if expression else None
@@ -157,14 +191,25 @@ class Driven(Dimensional):
         for name in RULES.values():
             if (text := getattr(self, name)) is not None:
                 try:
-                    found[name] = VectorExpression(text, self.space_dimensions, numbers)
+                    components = self._components(text) if name == "body_motion" else self.space_dimensions
+                    found[name] = VectorExpression(text, components, numbers)
                 except ValueError as error:
                     raise ConfigError(f"{name} = {shown(text)}: {error}") from None
         return found
 
+    def _components(self, text: str) -> int:
+        """Return the number of components of a motion: with rotation, if more than the directions are written."""
+        try:
+            whole = ast.parse(text.strip(), mode="eval").body
+        except (SyntaxError, ValueError, MemoryError, RecursionError):
+            return self.space_dimensions
+        written = len(whole.elts) if isinstance(whole, ast.Tuple) else 1
+        turns = 3 if self.space_dimensions == 2 else 6
+        return turns if written == turns else self.space_dimensions
+
     @property
     def rules(self) -> dict[str, Rule]:
-        """What the case prescribes by functions of place and time: ``inflow``, ``forcing``, ``sliding``."""
+        """What the case prescribes by functions of place and time: ``inflow``, ``forcing``, ``sliding``, ``motion``."""
         return {
             name: getattr(self, name)
             for name, parameter in RULES.items()

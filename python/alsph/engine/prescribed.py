@@ -1,7 +1,8 @@
 """What is prescribed by rules of place and time, by what they gave last they are known again, and what inlets let in.
 
 The rules, by name: ``inflow``, the velocity of the inlet particles [U]; ``forcing``, a body force per unit mass beside
-the constant one [U²/D]; ``sliding``, the velocity of the surfaces of bodies that stay in place [U].
+the constant one [U²/D]; ``sliding``, the velocity of the surfaces of bodies that stay in place [U]; ``motion``, how far
+bodies have come [D] and turned [rad], whose centres at the start are the positions.
 """
 
 import hashlib
@@ -23,7 +24,12 @@ Rule = Callable[[FloatArray, float], ArrayLike | None]
 None, of an inflow, leaves the inlet particles the velocities that they have.
 """
 
-WORDS = {"inflow": "inflow", "forcing": "body force", "sliding": "velocity of surfaces"}
+WORDS = {
+    "inflow": "inflow",
+    "forcing": "body force",
+    "sliding": "velocity of surfaces",
+    "motion": "motion of bodies",
+}
 """What the rules prescribe."""
 
 KEPT = 256
@@ -67,7 +73,7 @@ class Prescription:
 
 
 def asked(name: str, rule: Rule, position: FloatArray, time: float) -> FloatArray | None:
-    """Return the vectors (m, d) that a rule gives, None if it gives none.
+    """Return the vectors (m, d) that a rule gives, of a motion perhaps with rotations (m, d + 1 or 6); None if none.
 
     Raises
     ------
@@ -81,9 +87,12 @@ def asked(name: str, rule: Rule, position: FloatArray, time: float) -> FloatArra
         vectors = np.asarray(() if values is None else values, float)
     except (TypeError, ValueError):
         vectors = np.empty(0)
-    if vectors.shape not in (position.shape, position.shape[1:]):
-        raise ConfigError(f"{name}: the function must give {position.shape[1]} numbers a position, or as many")
-    return np.broadcast_to(vectors, position.shape)
+    dimensions = position.shape[1]
+    numbers = [dimensions, 3 if dimensions == 2 else 6] if name == "motion" else [dimensions]
+    if vectors.shape[-1:] not in {(number,) for number in numbers} or vectors.shape[:-1] not in {(), position.shape[:1]}:
+        told = " or ".join(map(str, numbers))
+        raise ConfigError(f"{name}: the function must give {told} numbers a position, or as many")
+    return np.broadcast_to(vectors, (len(position), vectors.shape[-1]))
 
 
 def difference(rules: Mapping[str, Rule], then: Mapping[str, Prescription]) -> str:
@@ -102,6 +111,8 @@ def _difference(name: str, rule: Rule | None, then: Prescription | None) -> str:
     now = asked(name, rule, then.position, then.time)
     if now is None:
         return f"a function for the {what} that gives no velocities"
+    if now.shape != then.values.shape:
+        return f"another {what}: of {now.shape[1]} numbers, where it had {then.values.shape[1]}"
     change = float(np.abs(now - then.values).max())
     if change <= 1e-12 * max(1.0, float(np.abs(then.values).max())):  # another mathematical library's rounding
         return ""

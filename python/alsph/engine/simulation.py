@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import alsph._alsph as _alsph
 from alsph.arrays import FloatArray
+from alsph.engine.motion import poses
 from alsph.engine.prescribed import Prescription, Rule, asked, backflow
 from alsph.engine.problem import Problem
 from alsph.errors import ConfigError, SharedError, SolverError
@@ -63,8 +64,15 @@ TYPES: dict[str, tuple[type[np.generic], int]] = {
     "normal": (np.float64, 2),
     "depth": (np.float64, 1),
     "id": (np.uint64, 1),
+    "pose": (np.float64, 2),
 }
 """The arrays of a state: their types and numbers of dimensions."""
+
+OF_BODIES = {"pose"}
+"""Those that have a row a body, and not a particle."""
+
+MOTION = ("displacement", "velocity", "angle", "angular_velocity")
+"""Columns of the history that tell how bodies move."""
 
 
 @contextmanager
@@ -146,7 +154,7 @@ class Simulation:
     Attributes
     ----------
     rules : dict of function
-        Those that :meth:`set_inflow` and :meth:`prescribe` were given: ``inflow``, ``forcing``, ``sliding``.
+        Those that :meth:`set_inflow` and :meth:`prescribe` were given: ``inflow``, ``forcing``, ``sliding``, ``motion``.
     prescribed : dict of Prescription
         What they gave for the last step.
     backflow : str
@@ -322,6 +330,8 @@ class Simulation:
         """
         with self._engine() as engine:
             rows = engine.take_history()
+        if not any(_is_rigid(body) for body in self.problem.settings["bodies"]):
+            rows = {name: values for name, values in rows.items() if name not in MOTION}
         rows = {"step": rows["step"], **rows, **self._coefficients(rows)}
         if keep and len(rows["step"]):
             self._history.append(rows)
@@ -377,8 +387,14 @@ class Simulation:
         else:
             self._apply(velocity, self.inflow_position())
 
-    def prescribe(self, *, forcing: Rule | None = AS_IT_IS, sliding: Rule | None = AS_IT_IS) -> None:
-        """Prescribe a body force, and the velocity of surfaces, by functions that are called once a step.
+    def prescribe(
+        self,
+        *,
+        forcing: Rule | None = AS_IT_IS,
+        sliding: Rule | None = AS_IT_IS,
+        motion: Rule | None = AS_IT_IS,
+    ) -> None:
+        """Prescribe a body force, the velocity of surfaces, and motions, by functions that are called in every step.
 
         What is not named stays as it is; None takes a function away.
 
@@ -392,11 +408,15 @@ class Simulation:
         sliding
             Likewise the velocity of the solid particles of bodies whose ``velocity`` is None [U], which stay where
             they are, as those of a cylinder that rotates; without, that of the state.
+        motion
+            Likewise how far the bodies that move, but have neither a ``velocity`` nor are ``rigid``, have come (b, d)
+            [D], or with the angles that they have turned by behind that, (b, 3) in 2-D and as a rotation vector (b, 6) in
+            3-D [rad]; of their centres at the start (b, d) and the time. Where they are at the time 0 is taken off.
 
         Raises
         ------
         ConfigError
-            If surfaces are to slide, and each body has a ``velocity`` of its own.
+            If surfaces are to slide, and each body has a ``velocity`` of its own, or if no body is there to move.
 
         Notes
         -----
@@ -409,7 +429,12 @@ class Simulation:
                 "sliding: each body has a velocity of its own; give those whose surface slides velocity = None, or "
                 "make it the method `sliding` of the case's class"
             )
-        for name, rule in (("forcing", forcing), ("sliding", sliding)):
+        if callable(motion) and not len(self._told_centres()):
+            raise ConfigError(
+                "motion: no body is moved by it; give those that are moves = True and velocity = None, or make it the "
+                "method `motion` of the case's class"
+            )
+        for name, rule in (("forcing", forcing), ("sliding", sliding), ("motion", motion)):
             if rule is AS_IT_IS:
                 continue
             for told in (self.rules, self.prescribed):
@@ -429,8 +454,15 @@ class Simulation:
                 *(
                     _answer(name, self.rules[name], self.prescribed) if name in self.rules else None
                     for name in ("forcing", "sliding")
-                )
+                ),
+                _motion(self.rules["motion"], self._told_centres(), self.prescribed) if "motion" in self.rules else None,
             )
+
+    def _told_centres(self) -> FloatArray:
+        """Return the centres (b, d) of the bodies that a rule moves."""
+        bodies = self.problem.settings["bodies"]
+        told = [body["center"] for body in bodies if _is_rigid(body) and not body.get("rigid")]
+        return np.array(told, float).reshape(len(told), self.problem.dimensions)
 
     def _prescribe(self, steps: int) -> int:
         """Apply an inflow given as a function; return how many of `steps` may be taken until it is due again."""
@@ -469,7 +501,7 @@ class Simulation:
         self._history = []
         if "inflow" in self.rules:
             self.set_inflow(self.rules["inflow"])
-        self.prescribe(forcing=self.rules.get("forcing"), sliding=self.rules.get("sliding"))
+        self.prescribe(**{name: self.rules.get(name) for name in ("forcing", "sliding", "motion")})
 
 
 def _answer(name: str, rule: Rule, prescribed: dict[str, Prescription]) -> Callable[[FloatArray, float], FloatArray]:
@@ -481,6 +513,22 @@ def _answer(name: str, rule: Rule, prescribed: dict[str, Prescription]) -> Calla
         return values
 
     return answer
+
+
+def _motion(rule: Rule, centres: FloatArray, prescribed: dict[str, Prescription]) -> Callable[[float], FloatArray]:
+    """Return what the engine asks of a rule for motions."""
+
+    def answer(time: float) -> FloatArray:
+        values = asked("motion", rule, centres, time)
+        assert values is not None
+        prescribed["motion"] = Prescription(time, centres, np.array(values))
+        return poses(rule, centres, time)
+
+    return answer
+
+
+def _is_rigid(body: dict[str, Any]) -> bool:
+    return bool(body["moves"] and body["velocity"] is None)
 
 
 def next_multiple(time: float, interval: float) -> float:

@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from alsph.engine.prescribed import WORDS, Prescription
-from alsph.engine.simulation import TYPES
+from alsph.engine.simulation import OF_BODIES, TYPES
 from alsph.errors import DamagedError, RunFolderError
 from alsph.folder.durable import replacing
 from alsph.folder.reading import DAMAGE, rows, sound
@@ -118,7 +118,7 @@ def digest(state: dict[str, Any]) -> str:
     order = np.argsort(state["id"]) if "id" in state else slice(None)
     for name in sorted(state):
         value = np.asarray(state[name])
-        value = np.ascontiguousarray(value[order] if value.ndim else value)
+        value = np.ascontiguousarray(value[order] if value.ndim and name not in OF_BODIES else value)
         total.update(f"{name} {value.dtype.str} {value.shape}".encode())
         total.update(value.data)
     return total.hexdigest()
@@ -136,7 +136,7 @@ def _prescription(file: h5py.File, rule: str) -> Prescription:
     """Return what a rule gave last."""
     found = (np.asarray(sound(file, f"{rule}_{key}")[()], float) for key in PRESCRIBED.values())
     time, position, values = found
-    if time.shape != (1,) or position.ndim != 2 or position.shape != values.shape:
+    if time.shape != (1,) or position.ndim != 2 or values.ndim != 2 or len(position) != len(values):
         raise ValueError(f"its {rule} is incomplete")
     return Prescription(float(time[0]), position, values)
 

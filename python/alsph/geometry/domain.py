@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from alsph.arrays import AXES, FloatArray
 from alsph.errors import ConfigError
 from alsph.geometry.points import checked_point, numbers
+from alsph.geometry.rigid import Rigid
 from alsph.parameters import choose, suggest
 from alsph.text import shown
 
@@ -134,11 +135,15 @@ class SolidBody:
     center : sequence of float, shape (d,)
         Point that its torques are taken about [D].
     velocity : sequence of float, shape (d,), optional
-        Velocity of its particles [U]; at rest if not given. None: the velocities that `Case.particles` gives them.
+        Velocity of its particles [U]; at rest if not given. None: the velocities that `Case.particles` gives them, or of
+        a body that moves those of its motion.
     moves : bool
         Whether its particles go along with that velocity; those of a plate that slides in its own plane need not.
+        Without a velocity the body moves as :meth:`alsph.cases.driven.Driven.motion` says, or freely if it is `rigid`.
     belt : (from, to), optional
         Coordinates along its velocity between which the particles of a body that moves go round [D], as on a belt.
+    rigid : Rigid, optional
+        What the body is, if the fluid moves it; it `moves` then, and has no `velocity`.
 
     Raises
     ------
@@ -156,6 +161,7 @@ class SolidBody:
     velocity: Sequence[float] | None = ()
     moves: bool = False
     belt: Sequence[float] | None = None
+    rigid: Rigid | None = None
 
     def __post_init__(self) -> None:
         """Check the name, the vectors, and that what they are of can be."""
@@ -170,14 +176,18 @@ class SolidBody:
             given = (0.0,) * len(center) if isinstance(self.velocity, tuple) and not self.velocity else self.velocity
             velocity = checked_point(f"body '{name}': velocity", given, len(center))
             _keep(self, "velocity", tuple(velocity.tolist()))
+        if self.rigid is not None:
+            if not isinstance(self.rigid, Rigid):
+                raise ConfigError(f"body '{name}': rigid = {shown(self.rigid)}: must be a Rigid(mass, inertia, displaced)")
+            self.rigid.settings(len(center))
+            _keep(self, "moves", True)
+            _keep(self, "velocity", None)
         if not isinstance(self.moves, bool):
             raise ConfigError(f"body '{name}': moves = {shown(self.moves)}: must be True or False")
-        if self.moves and self.velocity is None:
-            raise ConfigError(f"body '{name}': moves, and so needs a velocity")
         if self.belt is not None:
             belt = numbers(self.belt)
-            if belt.shape != (2,) or not belt[0] < belt[1] or not self.moves:
-                told = "must be two numbers, the lower one first, of a body that moves"
+            if belt.shape != (2,) or not belt[0] < belt[1] or not self.moves or self.velocity is None:
+                told = "must be two numbers, the lower one first, of a body that moves with a velocity"
                 raise ConfigError(f"body '{name}': belt = {shown(self.belt)}: {told}")
             _keep(self, "belt", tuple(belt.tolist()))
 
@@ -190,7 +200,8 @@ class SolidBody:
         """Return it as the engine takes it (docs/architecture.md)."""
         velocity = None if self.velocity is None else list(self.velocity)
         belt = {} if self.belt is None else {"belt": list(self.belt)}
-        return {"name": self.name, "velocity": velocity, "moves": self.moves, "center": list(self.center)} | belt
+        free = {} if self.rigid is None else {"rigid": self.rigid.settings(len(self.center))}
+        return {"name": self.name, "velocity": velocity, "moves": self.moves, "center": list(self.center)} | belt | free
 
 
 def _keep(record: object, name: str, value: object) -> None:

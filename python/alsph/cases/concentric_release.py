@@ -1,0 +1,114 @@
+"""A cylinder that is let go in the middle of another: what it drags along of the fluid is known exactly."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from alsph.analysis.measures import Measure
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
+from alsph.cases.base import Case
+from alsph.geometry.domain import Domain, SolidBody
+from alsph.geometry.lattice import lattice, symmetric_centres
+from alsph.geometry.packing import pack
+from alsph.geometry.particles import Kind, join, particles
+from alsph.geometry.rigid import Rigid
+from alsph.geometry.solids import cylinder_rings
+from alsph.geometry.volume import Volume
+
+RADIUS = 0.5
+SOURCE = "exact, of a fluid without viscosity: (m - ρA) g / (m + C_a ρA), C_a = (b² + a²)/(b² - a²)"
+
+
+class ConcentricRelease(Case):
+    """A free cylinder of diameter D that begins to sink or rise in the fluid at rest in a round vessel around it.
+
+    Velocities are in U = √(gD) and times in √(D/g). Gravity acts on the cylinder alone, less its buoyancy: the
+    hydrostatic pressure is left out of p. The fluid answers with the mass that it drags along, C_a = 5/3 times that of
+    the fluid displaced where the vessel is twice as wide.
+    """
+
+    name: ClassVar[str] = "concentric_release"
+    title: ClassVar[str] = "release of a cylinder in a round vessel"
+    settles: ClassVar[bool] = False
+
+    reynolds: float = Field(default=1e4, gt=0, description="Reynolds number UD/ν, U = √(gD) [-]")
+    resolution: int = Field(default=20, ge=8, description="particles across the cylinder, D/Δx [-]")
+    density_ratio: float = Field(default=2.0, gt=0, description="density of the cylinder over that of the fluid [-]")
+    vessel: float = Field(default=2.0, gt=1.3, description="diameter of the vessel [D]")
+
+    @property
+    def default_until(self) -> float:
+        """As long as it takes to fall some hundredths of the gap."""
+        return 0.5
+
+    @property
+    def coefficient_bodies(self) -> list[str]:
+        """Name of the cylinder."""
+        return ["cylinder"]
+
+    def domain(self) -> Domain:
+        """Return the square around the vessel, which closes it."""
+        radius = self.vessel / 2
+        return Domain((-radius, -radius), (radius, radius), [("none", "none")] * 2)
+
+    def bodies(self) -> list[SolidBody]:
+        """Return the cylinder, which is free, and the vessel."""
+        displaced = math.pi * RADIUS**2
+        mass = self.density_ratio * displaced
+        rigid = Rigid(mass, 0.5 * mass * RADIUS**2, displaced, force=(0, displaced - mass))
+        return [SolidBody("cylinder", (0, 0), rigid=rigid), SolidBody("vessel", (0, 0))]
+
+    def fluid_volume(self) -> float:
+        """Return the area between cylinder and vessel."""
+        return math.pi * ((self.vessel / 2) ** 2 - RADIUS**2)
+
+    def particle_estimate(self) -> int:
+        """Return about how many particles there are."""
+        hollow = max(0.0, RADIUS * self.resolution - self.support_layers)
+        return round(np.pi * ((self.vessel / 2 * self.resolution + self.support_layers) ** 2 - hollow**2))
+
+    def particles(self) -> dict[str, NDArray[Any]]:
+        """Return evenly spaced fluid at rest between rings of solid particles."""
+        spacing, layers = self.particle_spacing, self.support_layers
+        inner = cylinder_rings(RADIUS, spacing, layers)
+        outer = cylinder_rings(self.vessel / 2, spacing, layers, side=-1)
+        fluid = self._fluid(np.concatenate([inner.position, outer.position]))
+        return join(particles(Kind.FLUID, fluid, 0.0), inner.particles(), outer.particles(body=1))
+
+    def _fluid(self, solid: FloatArray) -> FloatArray:
+        """Return as many particles (n, 2) as the ring has room for."""
+
+        def height(points: FloatArray) -> FloatArray:
+            radius = np.hypot(*points.T)
+            return np.asarray(np.minimum(self.vessel / 2 - radius, radius - RADIUS))
+
+        count = math.ceil(self.vessel * self.resolution - 1e-6)
+        square = (count * self.particle_spacing) ** 2
+        corner = np.full(2, count * self.particle_spacing / 2)
+        cells = lattice(*[symmetric_centres(count, self.particle_spacing)] * 2)
+        return pack(cells, Volume(height, -corner, corner, square - self.fluid_volume(), 1.0), solid, self.particle_spacing)
+
+    @property
+    def added_mass_coefficient(self) -> float:
+        """Mass that the cylinder drags along at its centre over that of the fluid displaced [-]."""
+        outer, inner = (self.vessel / 2) ** 2, RADIUS**2
+        return (outer + inner) / (outer - inner)
+
+    @property
+    def acceleration(self) -> float:
+        """That of the cylinder at the start, in a fluid without viscosity, upwards [g]."""
+        return (1 - self.density_ratio) / (self.density_ratio + self.added_mass_coefficient)
+
+    def measures(self, run: Record) -> list[Measure]:
+        """Return the mean acceleration over the first tenth of √(D/g), in which the cylinder moves but little."""
+        time, velocity = run.history["time"], run.history.get("cylinder_velocity_y", np.empty(0))
+        name = "acceleration over the first 0.1 √(D/g), g"
+        if not len(velocity) or time[-1] < 0.1:
+            return [Measure(name, math.nan)]
+        return [Measure(name, float(np.interp(0.1, time, velocity) / 0.1), self.acceleration, 0.03, SOURCE)]

@@ -1,0 +1,58 @@
+"""Where rigid bodies are and how they move, of a rule that tells how far they have come."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from alsph.arrays import FloatArray
+from alsph.engine.prescribed import Rule, asked
+
+INTERVAL = 1e-3
+"""Between the times of which velocities and accelerations are formed, to fourth order [D/U]."""
+
+FIRST = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / (12 * INTERVAL)
+SECOND = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / (12 * INTERVAL**2)
+
+
+def poses(rule: Rule, centres: FloatArray, time: float) -> FloatArray:
+    """Return the poses (b, 18) of bodies that a rule moves from where they are at the time 0.
+
+    Parameters
+    ----------
+    rule
+        Gives their displacements (b, d) [D], or with rotation vectors behind them (b, 3) in 2-D, (b, 6) in 3-D [rad].
+    centres
+        Their centres at the start (b, d) [D].
+    time
+        Time [D/U].
+
+    Returns
+    -------
+    ndarray
+        Displacement, rotation vector, velocity, angular velocity, acceleration and angular acceleration, each of three
+        components.
+    """
+    start = _placed(rule, centres, 0.0)
+    way, turn = zip(*(_placed(rule, centres, time + k * INTERVAL) for k in range(-2, 3)), strict=True)
+    back = Rotation.from_rotvec(start[1]).inv()
+    now = Rotation.from_rotvec(turn[2])
+    if centres.shape[1] == 2:  # about one axis angles add up, and go on beyond a turn
+        angle, away = turn[2] - start[1], [each - turn[2] for each in turn]
+    else:
+        angle = (now * back).as_rotvec()
+        away = [(Rotation.from_rotvec(each) * now.inv()).as_rotvec() for each in turn]
+    rates = [np.tensordot(weights, np.stack(of), 1) for weights in (FIRST, SECOND) for of in (way, away)]
+    return np.hstack([way[2] - start[0], angle, *rates])
+
+
+def _placed(rule: Rule, centres: FloatArray, time: float) -> tuple[FloatArray, FloatArray]:
+    """Return displacement and rotation vector, three components each."""
+    values = asked("motion", rule, centres, time)
+    assert values is not None
+    dimensions = centres.shape[1]
+    way, turn = np.zeros((len(centres), 3)), np.zeros((len(centres), 3))
+    way[:, :dimensions] = values[:, :dimensions]
+    if values.shape[1] > dimensions:
+        turn[:, -(values.shape[1] - dimensions) :] = values[:, dimensions:]
+    return way, turn

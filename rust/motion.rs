@@ -1,0 +1,400 @@
+//! Bodies that move as rigid ones: as a rule tells, or as the fluid and other forces make them.
+//!
+//! The particles of such a body are always its shape, turned and displaced, so that it keeps its form however far it goes. The shape is not
+//! kept from run to run: its coordinates are multiples of a length so small that it does not matter, and so much larger than rounding that
+//! the positions at any time tell it to the last bit ([`GRAIN`]).
+//!
+//! A step takes derivatives where the body is in its frame, and makes the velocity u^{n+1} free of divergence, so solids
+//! show that of the body at the end of the step.
+//!
+//! A free body obeys M dV/dt = F, F being what acts at the end of a step. The fluid answers an acceleration at once with that of the mass it
+//! drags along, M_a, and with F of the step before a body lighter than that would swing up. So with an estimate M̂ of M_a
+//!
+//! ```text
+//! (M + M̂) A^{n+1} = F^n + M̂ A^n
+//! ```
+//!
+//! which changes nothing where A stands, and with which an error of A falls by |M̂ − M_a|/(M + M̂) a step; likewise rotation.
+
+use crate::base::Vector;
+use crate::base::error::{Error, Result, setting};
+use crate::particles::{ParticleKind, Particles};
+use crate::settings::{Body, Boundary, Rigid, Settings};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+/// Coordinates in a body's own axes are multiples of this part of Δx, normals of this number.
+const GRAIN: f64 = 1.0 / (1u64 << 30) as f64;
+
+/// Where a rigid body is: how far its centre has come and it has turned since the start, how fast it moves, and what accelerates it. In 2-D
+/// the last component alone turns.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pose {
+    pub displacement: Vector3<f64>,
+    /// Rotation vector.
+    pub angle: Vector3<f64>,
+    pub velocity: Vector3<f64>,
+    pub spin: Vector3<f64>,
+    pub acceleration: Vector3<f64>,
+    pub angular_acceleration: Vector3<f64>,
+}
+
+/// The numbers of a pose.
+pub const NUMBERS: usize = 18;
+
+impl Pose {
+    /// From its numbers, in the order of its fields.
+    pub fn from_numbers(numbers: [f64; NUMBERS]) -> Self {
+        let three = |k: usize| Vector3::from_column_slice(&numbers[3 * k..3 * k + 3]);
+        Self {
+            displacement: three(0),
+            angle: three(1),
+            velocity: three(2),
+            spin: three(3),
+            acceleration: three(4),
+            angular_acceleration: three(5),
+        }
+    }
+
+    pub fn numbers(&self) -> [f64; NUMBERS] {
+        let Self { displacement, angle, velocity, spin, acceleration, angular_acceleration } = self;
+        let all = [displacement, angle, velocity, spin, acceleration, angular_acceleration];
+        std::array::from_fn(|k| all[k / 3][k % 3])
+    }
+
+    /// After `time` with the same acceleration.
+    fn after<const D: usize>(&self, time: f64) -> Self {
+        let (velocity, spin) = (self.velocity + self.acceleration * time, self.spin + self.angular_acceleration * time);
+        let turned = (self.spin + spin) * (0.5 * time);
+        // About one axis angles add up, and go on beyond a turn.
+        let angle = if D == 2 {
+            self.angle + turned
+        } else {
+            (Rotation3::from_scaled_axis(turned) * Rotation3::from_scaled_axis(self.angle)).scaled_axis()
+        };
+        let displacement = self.displacement + (self.velocity + velocity) * (0.5 * time);
+        Self { displacement, angle, velocity, spin, ..*self }
+    }
+}
+
+/// The poses of all bodies that a rule moves, in their order, at a time.
+pub type MotionRule = Box<dyn FnMut(f64) -> Result<Vec<Pose>> + Send + Sync>;
+
+/// A time of the step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moment {
+    Start,
+    /// When its frame is.
+    Frame,
+    End,
+}
+
+/// All rigid bodies that move.
+#[derive(Debug)]
+pub struct Motion<const D: usize> {
+    bodies: Vec<Moving<D>>,
+    /// Of the settings' bodies, where in `bodies` each is.
+    place_of: Vec<Option<usize>>,
+    /// Of the solids in these bodies, by id. Empty until the first step.
+    shape: Vec<Shape<D>>,
+    /// Index of the particle, and of its shape, as they are stored now.
+    members: Vec<(usize, usize)>,
+    /// Lengths of the domain's periodic directions; zero of others.
+    period: Vector<D>,
+}
+
+#[derive(Debug)]
+struct Moving<const D: usize> {
+    body: u16,
+    center: Vector<D>,
+    /// Of a free body.
+    rigid: Option<Rigid>,
+    start: Pose,
+    frame: Pose,
+    end: Pose,
+    /// How far its particles are from its centre.
+    radius: f64,
+}
+
+/// Place and normal of a solid particle in the axes of its body.
+#[derive(Clone, Copy, Debug)]
+struct Shape<const D: usize> {
+    id: u64,
+    body: usize,
+    arm: Vector<D>,
+    normal: Vector<D>,
+}
+
+impl<const D: usize> Default for Motion<D> {
+    fn default() -> Self {
+        let (bodies, place_of, shape, members) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { bodies, place_of, shape, members, period: Vector::zeros() }
+    }
+}
+
+impl<const D: usize> Motion<D> {
+    pub fn new(settings: &Settings) -> Self {
+        let mut motion = Self::default();
+        for (index, body) in settings.bodies.iter().enumerate() {
+            let moving = body.is_rigid();
+            motion.place_of.push(moving.then_some(motion.bodies.len()));
+            if moving {
+                motion.bodies.push(Moving {
+                    body: index as u16,
+                    center: Vector::from_column_slice(&body.center),
+                    rigid: body.rigid.clone(),
+                    start: Pose::default(),
+                    frame: Pose::default(),
+                    end: Pose::default(),
+                    radius: 0.0,
+                });
+            }
+        }
+        let domain = &settings.domain;
+        let periodic = |axis: usize| domain.boundaries[axis][0] == Boundary::Periodic;
+        motion.period =
+            Vector::from_fn(|axis, _| if periodic(axis) { domain.upper[axis] - domain.lower[axis] } else { 0.0 });
+        motion
+    }
+
+    pub fn is_none(&self) -> bool {
+        self.bodies.is_empty()
+    }
+
+    /// How many bodies a rule has to move.
+    pub fn told(&self) -> usize {
+        self.bodies.iter().filter(|body| body.rigid.is_none()).count()
+    }
+
+    /// The pose of each of the settings' bodies at the end of the last step; of those that do not move so, none.
+    pub fn poses(&self) -> Vec<Pose> {
+        self.place_of.iter().map(|place| place.map_or_else(Pose::default, |place| self.bodies[place].start)).collect()
+    }
+
+    /// Go on with free bodies in such `poses`, one for each of the settings' bodies.
+    pub fn set_poses(&mut self, poses: &[Pose]) {
+        self.bodies.iter_mut().for_each(|body| body.start = poses[body.body as usize]);
+    }
+
+    /// Be ready for a step at `time`: the first time, take the shape of the bodies from the particles, and give these their velocities.
+    pub fn start(
+        &mut self,
+        settings: &Settings,
+        particles: &mut Particles<D>,
+        rule: &mut Option<MotionRule>,
+        time: f64,
+    ) -> Result<()> {
+        if self.is_none() || !self.shape.is_empty() {
+            return Ok(());
+        }
+        self.tell(rule, time, Moment::Start)?;
+        let grain = GRAIN * settings.particle_spacing;
+        for i in (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Solid) {
+            let Some(body) = self.place_of[particles.body[i] as usize] else { continue };
+            let Moving { center, start, radius, .. } = &mut self.bodies[body];
+            let arm = particles.position[i] - (*center + Vector::from_fn(|k, _| start.displacement[k]));
+            let arm = arm - self.period.zip_map(&arm, whole_periods);
+            let back = |v: &Vector<D>, grain: f64| turned(&-start.angle, v).map(|x| (x / grain).round() * grain);
+            *radius = radius.max(arm.norm());
+            let normal = back(&particles.normal[i], GRAIN);
+            let normal = normal.try_normalize(0.0).unwrap_or(normal);
+            self.shape.push(Shape { id: particles.id[i], body, arm: back(&arm, grain), normal });
+        }
+        self.shape.sort_unstable_by_key(|shape| shape.id);
+        self.bodies.iter_mut().for_each(|body| (body.frame, body.end) = (body.start, body.start));
+        self.locate(particles);
+        self.place(Moment::Start, &mut particles.position, &mut particles.normal);
+        self.give_velocity(&mut particles.velocity);
+        Ok(())
+    }
+
+    /// Find where the bodies will be after `time_step`, and after the `fraction` of it at which the frame is.
+    pub fn advance(&mut self, rule: &mut Option<MotionRule>, time: f64, time_step: f64, fraction: f64) -> Result<()> {
+        if self.is_none() {
+            return Ok(());
+        }
+        for body in self.bodies.iter_mut().filter(|body| body.rigid.is_some()) {
+            body.frame = body.start.after::<D>(fraction * time_step);
+            body.end = body.start.after::<D>(time_step);
+        }
+        self.tell(rule, time + fraction * time_step, Moment::Frame)?;
+        self.tell(rule, time + time_step, Moment::End)
+    }
+
+    /// Ask the rule where the bodies are that it moves.
+    fn tell(&mut self, rule: &mut Option<MotionRule>, time: f64, moment: Moment) -> Result<()> {
+        let told = self.told();
+        if told == 0 {
+            return Ok(());
+        }
+        let Some(rule) = rule else {
+            return Err(setting("bodies", "one moves, is not free, and has neither a velocity nor a rule for its motion"));
+        };
+        let poses = rule(time)?;
+        if poses.len() != told {
+            let problem = format!("is of {} bodies, where {told} are moved by it", poses.len());
+            return Err(Error::Array { name: "motion", problem });
+        }
+        if !poses.iter().flat_map(Pose::numbers).all(f64::is_finite) {
+            let problem = format!("at time {time:.6} is not finite");
+            return Err(Error::Array { name: "motion", problem });
+        }
+        let bodies = self.bodies.iter_mut().filter(|body| body.rigid.is_none());
+        for (body, pose) in bodies.zip(poses) {
+            *body.pose_mut(moment) = pose;
+        }
+        Ok(())
+    }
+
+    /// Find the particles of the bodies, in the order in which they are stored.
+    pub fn locate(&mut self, particles: &Particles<D>) {
+        self.members.clear();
+        if self.shape.is_empty() {
+            return;
+        }
+        for i in (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Solid) {
+            if self.place_of[particles.body[i] as usize].is_some()
+                && let Ok(shape) = self.shape.binary_search_by_key(&particles.id[i], |shape| shape.id)
+            {
+                self.members.push((i, shape));
+            }
+        }
+    }
+
+    /// Put the particles where they are at a moment of the step.
+    pub fn place(&self, moment: Moment, position: &mut [Vector<D>], normal: &mut [Vector<D>]) {
+        let turn: Vec<_> = self.bodies.iter().map(|body| Rotation3::from_scaled_axis(body.pose(moment).angle)).collect();
+        for &(i, shape) in &self.members {
+            let Shape { body, arm, normal: outward, .. } = &self.shape[shape];
+            let Moving { center, .. } = &self.bodies[*body];
+            let displacement = self.bodies[*body].pose(moment).displacement;
+            let there = *center + Vector::from_fn(|k, _| displacement[k]) + rotated(&turn[*body], arm);
+            position[i] = there + self.period.zip_map(&(position[i] - there), whole_periods);
+            normal[i] = rotated(&turn[*body], outward);
+        }
+    }
+
+    /// Give them the velocities that they have at the end of the step.
+    pub fn give_velocity(&self, velocity: &mut [Vector<D>]) {
+        for &(i, shape) in &self.members {
+            let Shape { body, arm, .. } = &self.shape[shape];
+            let Pose { angle, velocity: speed, spin, .. } = self.bodies[*body].end;
+            let arm = spatial(&turned(&angle, arm));
+            let all = speed + spin.cross(&arm);
+            velocity[i] = Vector::from_fn(|k, _| all[k]);
+        }
+    }
+
+    /// Set `out` to the accelerations of the first `count` particles, zero but of these bodies, at the end of the step; empty if there are none.
+    pub fn accelerations(&self, count: usize, out: &mut Vec<Vector<D>>) {
+        out.clear();
+        if self.is_none() {
+            return;
+        }
+        out.resize(count, Vector::zeros());
+        for &(i, shape) in &self.members {
+            let Shape { body, arm, .. } = &self.shape[shape];
+            let Pose { angle, spin, acceleration, angular_acceleration, .. } = self.bodies[*body].end;
+            let arm = spatial(&turned(&angle, arm));
+            let all = acceleration + angular_acceleration.cross(&arm) + spin.cross(&spin.cross(&arm));
+            out[i] = Vector::from_fn(|k, _| all[k]);
+        }
+    }
+
+    /// The centre of a body of the settings in the frame of the step.
+    pub fn center(&self, body: usize, bodies: &[Body]) -> Vector<D> {
+        let center = Vector::from_column_slice(&bodies[body].center);
+        match self.place_of.get(body).copied().flatten() {
+            Some(place) => center + Vector::from_fn(|k, _| self.bodies[place].frame.displacement[k]),
+            None => center,
+        }
+    }
+
+    /// The vector from a body's centre to one of its particles, if the body may lie across a periodic side.
+    pub fn arm(&self, body: usize, arm: Vector<D>) -> Vector<D> {
+        match self.place_of.get(body).copied().flatten() {
+            Some(_) => arm - self.period.zip_map(&arm, whole_periods),
+            None => arm,
+        }
+    }
+
+    /// The bodies are where the step has led to; `loads` are forces and torques of the fluid on each of the settings' bodies.
+    pub fn end(&mut self, body_force: &[f64], loads: impl Fn(usize) -> [Vector3<f64>; 2]) {
+        for body in &mut self.bodies {
+            body.start = body.end;
+            if let Some(rigid) = &body.rigid {
+                let [force, torque] = loads(body.body as usize);
+                body.start.respond::<D>(rigid, body_force, force, torque);
+            }
+        }
+    }
+
+    /// The largest acceleration of a body's surface at the start of the step.
+    pub fn acceleration(&self) -> f64 {
+        let of = |body: &Moving<D>| {
+            let Pose { acceleration, angular_acceleration, spin, .. } = body.start;
+            acceleration.norm() + (angular_acceleration.norm() + spin.norm_squared()) * body.radius
+        };
+        self.bodies.iter().map(of).fold(0.0, f64::max)
+    }
+}
+
+impl Pose {
+    /// Accelerate a free body as the fluid's force and torque, and its own, ask for.
+    fn respond<const D: usize>(&mut self, rigid: &Rigid, body_force: &[f64], force: Vector3<f64>, torque: Vector3<f64>) {
+        let Rigid { mass, inertia, force: own, stiffness, damping, free, added_mass, added_inertia } = rigid;
+        let of = |values: &[f64]| Vector3::from_fn(|k, _| values.get(k).copied().unwrap_or(0.0));
+        let spring = of(stiffness).component_mul(&self.displacement) + of(damping).component_mul(&self.velocity);
+        let total = force + of(own) + of(body_force) * *mass - spring;
+        let moves = |k: usize| k < D && free[k];
+        let acceleration = (total + self.acceleration * *added_mass) / (mass + added_mass);
+        self.acceleration = Vector3::from_fn(|k, _| if moves(k) { acceleration[k] } else { 0.0 });
+        let turn = Rotation3::from_scaled_axis(self.angle);
+        let own_axes = match inertia[..] {
+            [only] => Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, only)),
+            _ => Matrix3::from_row_slice(inertia),
+        };
+        let inertia = turn * own_axes * turn.inverse();
+        let gyroscopic = if D == 2 { Vector3::zeros() } else { self.spin.cross(&(inertia * self.spin)) };
+        let twist = torque - gyroscopic + self.angular_acceleration * *added_inertia;
+        let turning =
+            (inertia + Matrix3::identity() * *added_inertia).try_inverse().map_or_else(Vector3::zeros, |i| i * twist);
+        let turns = |k: usize| if D == 2 { k == 2 && free[2] } else { free[3 + k] };
+        self.angular_acceleration = Vector3::from_fn(|k, _| if turns(k) { turning[k] } else { 0.0 });
+    }
+}
+
+impl<const D: usize> Moving<D> {
+    fn pose(&self, moment: Moment) -> &Pose {
+        match moment {
+            Moment::Start => &self.start,
+            Moment::Frame => &self.frame,
+            Moment::End => &self.end,
+        }
+    }
+
+    fn pose_mut(&mut self, moment: Moment) -> &mut Pose {
+        match moment {
+            Moment::Start => &mut self.start,
+            Moment::Frame => &mut self.frame,
+            Moment::End => &mut self.end,
+        }
+    }
+}
+
+/// The whole periods in a length; none where there is no period.
+fn whole_periods(period: f64, length: f64) -> f64 {
+    if period > 0.0 { period * (length / period).round() } else { 0.0 }
+}
+
+fn spatial<const D: usize>(v: &Vector<D>) -> Vector3<f64> {
+    Vector3::from_fn(|k, _| if k < D { v[k] } else { 0.0 })
+}
+
+fn rotated<const D: usize>(rotation: &Rotation3<f64>, v: &Vector<D>) -> Vector<D> {
+    let rotated = rotation * spatial(v);
+    Vector::from_fn(|k, _| rotated[k])
+}
+
+fn turned<const D: usize>(angle: &Vector3<f64>, v: &Vector<D>) -> Vector<D> {
+    rotated(&Rotation3::from_scaled_axis(*angle), v)
+}
