@@ -14,6 +14,9 @@ const LONELY: f64 = 0.25;
 /// How far under a surface [Δx] a particle is lost: beyond the outermost solid particles.
 const DEEP: f64 = 0.75;
 
+/// How far beyond a side [Δx] a particle of a body that moves may be.
+const OUTSIDE: f64 = 0.25;
+
 /// What is wrong with a particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Symptom {
@@ -43,14 +46,21 @@ pub fn find<const D: usize>(
             return symptom("pressure", particles.pressure[i]);
         }
         if particles.kind[i] == ParticleKind::Solid {
-            return None;
+            let sides = |side| side != Boundary::Periodic;
+            let beyond = if settings.bodies[particles.body[i] as usize].is_rigid() {
+                beyond(settings, &particles.position[i], sides)
+            } else {
+                0.0
+            };
+            return if beyond > OUTSIDE * settings.particle_spacing { symptom("position", beyond) } else { None };
         }
         let speed = particles.velocity[i].norm();
         if speed.is_nan() || speed > fastest {
             return symptom("velocity", speed);
         }
         if particles.kind[i] == ParticleKind::Fluid {
-            let beyond = beyond_walls(settings, &particles.position[i]);
+            let closed = |side| !matches!(side, Boundary::Inlet | Boundary::Outlet | Boundary::Air);
+            let beyond = beyond(settings, &particles.position[i], closed);
             if beyond > radius {
                 return symptom("position", beyond);
             }
@@ -93,10 +103,9 @@ fn depth<const D: usize>(settings: &Settings, particles: &Particles<D>, frame: &
     facing.filter(|&j| frame.stencil.is_near(settings, i, j)).map(least).fold(0.0, f64::max)
 }
 
-/// How far `position` lies beyond the sides of the domain that particles cannot cross.
-fn beyond_walls<const D: usize>(settings: &Settings, position: &Vector<D>) -> f64 {
+/// How far `position` lies beyond the sides of the domain that are `closed`.
+fn beyond<const D: usize>(settings: &Settings, position: &Vector<D>, closed: impl Fn(Boundary) -> bool) -> f64 {
     let domain = &settings.domain;
-    let closed = |side| !matches!(side, Boundary::Inlet | Boundary::Outlet | Boundary::Air);
     (0..D).fold(0.0, |farthest: f64, axis| {
         let [lower, upper] = domain.boundaries[axis];
         let below = if closed(lower) { domain.lower[axis] - position[axis] } else { 0.0 };
@@ -130,6 +139,10 @@ pub fn likely_cause<const D: usize>(
         );
     }
     match symptom.field {
+        "position" if particles.kind[symptom.particle] == ParticleKind::Solid => format!(
+            "body \"{}\" has reached a side of the domain: let it move less far, or take a larger domain",
+            settings.bodies[particles.body[symptom.particle] as usize].name
+        ),
         "position" => "it has gone through a wall or into a body: take a smaller time step or a finer resolution".into(),
         "volume" => "a void has opened around it: take a smaller time step, a finer resolution, or more shifting".into(),
         _ => format!(

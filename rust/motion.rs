@@ -7,14 +7,23 @@
 //! A step takes derivatives where the body is in its frame, and makes the velocity u^{n+1} free of divergence, so solids
 //! show that of the body at the end of the step.
 //!
-//! A free body obeys M dV/dt = F, F being what acts at the end of a step. The fluid answers an acceleration at once with that of the mass it
-//! drags along, M_a, and with F of the step before a body lighter than that would swing up. So with an estimate M̂ of M_a
+//! A free body obeys M dV/dt = F, F being what acts at the end of a step. With F of the step before, a light body would swing up, because
+//! the fluid answers. What it answers within the step is therefore taken for granted. Where a Poisson equation is solved that
+//! is the acceleration of the mass that the body drags along, M_a; with an estimate M̂ of it
 //!
 //! ```text
-//! (M + M̂) A^{n+1} = F^n + M̂ A^n
+//! (M + M̂) A^{n+1} = F^n + M̂ A^n,
 //! ```
 //!
-//! which changes nothing where A stands, and with which an error of A falls by |M̂ − M_a|/(M + M̂) a step; likewise rotation.
+//! and an error of A falls by |M̂ − M_a|/(M + M̂) a step. Where the pressure travels as waves of a speed c, as in the other schemes, a surface S
+//! that changes its velocity feels −ρ c S of that at once, and the rest comes with the waves; with an acceleration Ā that follows A slowly, so
+//! that it makes no difference to smooth motion,
+//!
+//! ```text
+//! (M + ρ c S Δt) A^{n+1} = F^n + ρ c S Δt Ā^n.
+//! ```
+//!
+//! Likewise rotation. Where c is given, as in weakly compressible schemes, M A^{n+1} = F^n does with ρ c S Δt < M/2.
 
 use crate::base::Vector;
 use crate::base::error::{Error, Result, setting};
@@ -24,6 +33,15 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// Coordinates in a body's own axes are multiples of this part of Δx, normals of this number.
 const GRAIN: f64 = 1.0 / (1u64 << 30) as f64;
+
+/// Solids less deep than this [Δx] lie under the surface.
+const LAYER: f64 = 0.75;
+
+/// How much of the way to A the slow Ā goes in a step.
+const FOLLOWING: f64 = 0.1;
+
+/// ρ c S Δt over M up to which a body that sound reaches has no need of that.
+const ACOUSTIC_SHARE: f64 = 0.5;
 
 /// Where a rigid body is: how far its centre has come and it has turned since the start, how fast it moves, and what accelerates it. In 2-D
 /// the last component alone turns.
@@ -36,10 +54,13 @@ pub struct Pose {
     pub spin: Vector3<f64>,
     pub acceleration: Vector3<f64>,
     pub angular_acceleration: Vector3<f64>,
+    /// What follows the two slowly, of a free body.
+    pub mean_acceleration: Vector3<f64>,
+    pub mean_angular_acceleration: Vector3<f64>,
 }
 
 /// The numbers of a pose.
-pub const NUMBERS: usize = 18;
+pub const NUMBERS: usize = 24;
 
 impl Pose {
     /// From its numbers, in the order of its fields.
@@ -52,12 +73,22 @@ impl Pose {
             spin: three(3),
             acceleration: three(4),
             angular_acceleration: three(5),
+            mean_acceleration: three(6),
+            mean_angular_acceleration: three(7),
         }
     }
 
     pub fn numbers(&self) -> [f64; NUMBERS] {
-        let Self { displacement, angle, velocity, spin, acceleration, angular_acceleration } = self;
-        let all = [displacement, angle, velocity, spin, acceleration, angular_acceleration];
+        let all = [
+            self.displacement,
+            self.angle,
+            self.velocity,
+            self.spin,
+            self.acceleration,
+            self.angular_acceleration,
+            self.mean_acceleration,
+            self.mean_angular_acceleration,
+        ];
         std::array::from_fn(|k| all[k / 3][k % 3])
     }
 
@@ -113,6 +144,9 @@ struct Moving<const D: usize> {
     end: Pose,
     /// How far its particles are from its centre.
     radius: f64,
+    /// The fluid's mass in the layer Δx over its surface, and the moment of inertia of that for what pushes it as the body turns.
+    layer: f64,
+    layer_inertia: f64,
 }
 
 /// Place and normal of a solid particle in the axes of its body.
@@ -122,6 +156,8 @@ struct Shape<const D: usize> {
     body: usize,
     arm: Vector<D>,
     normal: Vector<D>,
+    /// Whether it lies under the surface.
+    outer: bool,
 }
 
 impl<const D: usize> Default for Motion<D> {
@@ -146,6 +182,8 @@ impl<const D: usize> Motion<D> {
                     frame: Pose::default(),
                     end: Pose::default(),
                     radius: 0.0,
+                    layer: 0.0,
+                    layer_inertia: 0.0,
                 });
             }
         }
@@ -197,9 +235,16 @@ impl<const D: usize> Motion<D> {
             *radius = radius.max(arm.norm());
             let normal = back(&particles.normal[i], GRAIN);
             let normal = normal.try_normalize(0.0).unwrap_or(normal);
-            self.shape.push(Shape { id: particles.id[i], body, arm: back(&arm, grain), normal });
+            let outer = particles.depth[i] < LAYER * settings.particle_spacing;
+            self.shape.push(Shape { id: particles.id[i], body, arm: back(&arm, grain), normal, outer });
         }
         self.shape.sort_unstable_by_key(|shape| shape.id);
+        let mass = settings.density * settings.particle_spacing.powi(D as i32);
+        for shape in self.shape.iter().filter(|shape| shape.outer) {
+            let body = &mut self.bodies[shape.body];
+            body.layer += mass;
+            body.layer_inertia += mass * spatial(&shape.arm).cross(&spatial(&shape.normal)).norm_squared();
+        }
         self.bodies.iter_mut().for_each(|body| (body.frame, body.end) = (body.start, body.start));
         self.locate(particles);
         self.place(Moment::Start, &mut particles.position, &mut particles.normal);
@@ -317,15 +362,29 @@ impl<const D: usize> Motion<D> {
         }
     }
 
-    /// The bodies are where the step has led to; `loads` are forces and torques of the fluid on each of the settings' bodies.
-    pub fn end(&mut self, body_force: &[f64], loads: impl Fn(usize) -> [Vector3<f64>; 2]) {
+    /// The bodies are where the step has led to; `loads` are forces and torques of the fluid on each of the settings' bodies, and `reach` is
+    /// how far the pressure travels in a step over Δx.
+    pub fn end(&mut self, body_force: &[f64], reach: f64, loads: impl Fn(usize) -> [Vector3<f64>; 2]) {
         for body in &mut self.bodies {
             body.start = body.end;
             if let Some(rigid) = &body.rigid {
                 let [force, torque] = loads(body.body as usize);
-                body.start.respond::<D>(rigid, body_force, force, torque);
+                let (at_once, following) = if reach.is_finite() {
+                    ([body.layer, body.layer_inertia].map(|layer| reach * layer), FOLLOWING)
+                } else {
+                    ([rigid.added_mass, rigid.added_inertia], 1.0)
+                };
+                body.start.respond::<D>(rigid, at_once, body_force, force, torque);
+                body.start.follow(following);
             }
         }
+    }
+
+    /// Largest Δt for free bodies in a fluid with this speed of sound.
+    pub fn acoustic_limit(&self, settings: &Settings, sound_speed: f64) -> f64 {
+        let lightness = |body: &Moving<D>| body.rigid.as_ref().map_or(0.0, |rigid| body.layer / rigid.mass);
+        let lightest = self.bodies.iter().map(lightness).fold(0.0, f64::max);
+        ACOUSTIC_SHARE * settings.particle_spacing / (sound_speed * lightest)
     }
 
     /// The largest acceleration of a body's surface at the start of the step.
@@ -339,14 +398,22 @@ impl<const D: usize> Motion<D> {
 }
 
 impl Pose {
-    /// Accelerate a free body as the fluid's force and torque, and its own, ask for.
-    fn respond<const D: usize>(&mut self, rigid: &Rigid, body_force: &[f64], force: Vector3<f64>, torque: Vector3<f64>) {
-        let Rigid { mass, inertia, force: own, stiffness, damping, free, added_mass, added_inertia } = rigid;
+    /// Accelerate a free body as the fluid's force and torque, and its own, ask for. The fluid answers at once with a mass and a moment of
+    /// inertia.
+    fn respond<const D: usize>(
+        &mut self,
+        rigid: &Rigid,
+        [added_mass, added_inertia]: [f64; 2],
+        body_force: &[f64],
+        force: Vector3<f64>,
+        torque: Vector3<f64>,
+    ) {
+        let Rigid { mass, inertia, force: own, stiffness, damping, free, .. } = rigid;
         let of = |values: &[f64]| Vector3::from_fn(|k, _| values.get(k).copied().unwrap_or(0.0));
         let spring = of(stiffness).component_mul(&self.displacement) + of(damping).component_mul(&self.velocity);
         let total = force + of(own) + of(body_force) * *mass - spring;
         let moves = |k: usize| k < D && free[k];
-        let acceleration = (total + self.acceleration * *added_mass) / (mass + added_mass);
+        let acceleration = (total + self.mean_acceleration * added_mass) / (mass + added_mass);
         self.acceleration = Vector3::from_fn(|k, _| if moves(k) { acceleration[k] } else { 0.0 });
         let turn = Rotation3::from_scaled_axis(self.angle);
         let own_axes = match inertia[..] {
@@ -355,11 +422,16 @@ impl Pose {
         };
         let inertia = turn * own_axes * turn.inverse();
         let gyroscopic = if D == 2 { Vector3::zeros() } else { self.spin.cross(&(inertia * self.spin)) };
-        let twist = torque - gyroscopic + self.angular_acceleration * *added_inertia;
+        let twist = torque - gyroscopic + self.mean_angular_acceleration * added_inertia;
         let turning =
-            (inertia + Matrix3::identity() * *added_inertia).try_inverse().map_or_else(Vector3::zeros, |i| i * twist);
+            (inertia + Matrix3::identity() * added_inertia).try_inverse().map_or_else(Vector3::zeros, |i| i * twist);
         let turns = |k: usize| if D == 2 { k == 2 && free[2] } else { free[3 + k] };
         self.angular_acceleration = Vector3::from_fn(|k, _| if turns(k) { turning[k] } else { 0.0 });
+    }
+
+    fn follow(&mut self, share: f64) {
+        self.mean_acceleration += (self.acceleration - self.mean_acceleration) * share;
+        self.mean_angular_acceleration += (self.angular_acceleration - self.mean_angular_acceleration) * share;
     }
 }
 

@@ -208,7 +208,8 @@ impl<const D: usize> Simulation<D> {
         report.outcome = Outcome::new(step.settings, particles, solved, divergence);
         self.end_step(time_step);
         let loads = &report.loads;
-        self.flow.motion.end(&self.settings.body_force, |body| loads[body].total());
+        let reach = self.scheme.reach(time_step) / self.settings.particle_spacing;
+        self.flow.motion.end(&self.settings.body_force, reach, |body| loads[body].total());
         report.poses = self.flow.motion.poses();
         report.clock = self.clock;
         report.counts = self.flow.particles.counts();
@@ -275,7 +276,9 @@ impl<const D: usize> Simulation<D> {
             let symptom = Symptom { particle: fastest.unwrap_or(0), field: "velocity", value: velocity_max };
             return Err(self.diverged(symptom, fastest_waves, velocity_max));
         }
-        let bodies = settings.acceleration_limit(self.flow.motion.acceleration());
+        let motion = &self.flow.motion;
+        let sound = settings.sound_speed().map_or(f64::INFINITY, |speed| motion.acoustic_limit(settings, speed));
+        let bodies = settings.acceleration_limit(motion.acceleration()).min(sound);
         Ok(settings.time_step.min(fastest_waves).min(limits.viscous).min(limits.body_force).min(bodies))
     }
 

@@ -40,6 +40,8 @@ mod n_custom_scheme;
 mod o_custom_kernel;
 #[path = "loads.rs"]
 mod p_loads;
+#[path = "motion.rs"]
+mod p_motion;
 #[path = "faces.rs"]
 mod q_faces;
 #[path = "flows.rs"]

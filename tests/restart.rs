@@ -1,8 +1,10 @@
 //! A run that is cut and restored, with its particles stored in any order and all that is stale made NaN, has the bits of a whole one
 //! without, whatever the settings.
 
-use alsph::forcing::Forcing;
+use alsph::forcing::Rule;
+use alsph::motion::{MotionRule, Pose};
 use alsph::{Clock, ParticleKind, Particles, Simulation, Vector};
+use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::collections::HashSet;
 use std::f64::consts::TAU;
@@ -28,7 +30,7 @@ const FACTORS: [(&str, &[&str]); 19] = [
         ],
     ),
     ("third direction", &["periodic", "slip", "walls"]),
-    ("moves", &["false", "true", "belt"]),
+    ("moves", &["false", "true", "belt", "told", "free"]),
     ("prescribed", &["nothing", "force and surfaces"]),
     ("wall_velocity", &["paper", "adami", "cubic", "morris"]),
     ("wall_pressure", &["paper", "adami", "linear"]),
@@ -131,6 +133,9 @@ fn settings<const D: usize>(configuration: &Configuration, spacing: f64) -> Valu
             value["wall_pressure"] = "adami".into();
         }
     }
+    if is_rigid(configuration) && value["wall_pressure"] == "paper" {
+        value["wall_pressure"] = "linear".into();
+    }
     if value["scheme"]["kind"].as_str().is_some_and(|kind| kind.contains("isph")) && value["derivative_frame"] == "updated" {
         (value["derivative_frame"], value["search_every_iteration"]) = ("predicted".into(), false.into());
     }
@@ -152,6 +157,22 @@ fn settings<const D: usize>(configuration: &Configuration, spacing: f64) -> Valu
         body("body", [0.4, 0.0, 0.1], moves == "true"),
     ];
     value["bodies"] = bodies.to_vec().into();
+    if is_rigid(configuration) {
+        let body = &mut value["bodies"][2];
+        (body["velocity"], body["moves"]) = (Value::Null, true.into());
+        body["center"] = centre::<D>(choice(configuration, "layout"), 0.0).as_slice().into();
+    }
+    if moves == "free" {
+        // Of what lies across a slip side half is there.
+        let turns = !choice(configuration, "layout").contains("slip side");
+        let turning = if D == 2 { 1 } else { 3 };
+        let inertia = if D == 2 { vec![0.01] } else { vec![0.01, 0.001, 0.0, 0.001, 0.012, 0.0, 0.0, 0.0, 0.011] };
+        let free = [vec![true], vec![turns; D - 1 + turning]].concat();
+        value["bodies"][2]["rigid"] = json!({
+            "mass": 0.05, "inertia": inertia, "force": vec![0.05; D], "stiffness": vec![1.0; D], "damping": vec![0.1; D],
+            "free": free, "added_mass": 0.05, "added_inertia": 0.01,
+        });
+    }
     if prescribes(configuration) {
         value["bodies"][0]["velocity"] = Value::Null;
     }
@@ -161,6 +182,27 @@ fn settings<const D: usize>(configuration: &Configuration, spacing: f64) -> Valu
         value["bodies"][1]["belt"] = json!([-outside, 1.0 + outside]);
     }
     value
+}
+
+fn is_rigid(configuration: &Configuration) -> bool {
+    ["told", "free"].contains(&choice(configuration, "moves"))
+}
+
+/// The motion of a body, which turns if it can.
+fn motion(configuration: &Configuration, dimensions: usize) -> MotionRule {
+    let turns = if choice(configuration, "layout").contains("slip side") { 0.0 } else { 1.0 };
+    let about = if dimensions == 2 { Vector3::z() } else { Vector3::new(0.6, 0.0, 0.8) };
+    Box::new(move |time| {
+        let (way, swing) = (Vector3::x() * 0.3, about * (2.0 * turns));
+        Ok(vec![Pose {
+            displacement: way * time,
+            velocity: way,
+            angle: swing * (time + time * time),
+            spin: swing * (1.0 + 2.0 * time),
+            angular_acceleration: swing * 2.0,
+            ..Pose::default()
+        }])
+    })
 }
 
 fn prescribes(configuration: &Configuration) -> bool {
@@ -274,15 +316,21 @@ fn plate<const D: usize>(
     (choice(configuration, "layout").contains("plate") && inside).then(|| [face(1.0), face(-1.0)])
 }
 
-/// Depth below the surface of the body, and the normal there, if `position` is inside.
-fn body<const D: usize>(configuration: &Configuration, position: &Vector<D>, spacing: f64) -> Option<(f64, Vector<D>)> {
-    let layout = choice(configuration, "layout");
-    let mut centre = Vector::<D>::repeat(0.5);
+/// The middle of the body; of one across a periodic side where its x is `side`.
+fn centre<const D: usize>(layout: &str, side: f64) -> Vector<D> {
+    let mut centre = Vector::repeat(0.5);
     match layout {
-        "body across a periodic side" => centre[0] = position[0].round(),
+        "body across a periodic side" => centre[0] = side,
         "body across a slip side" => centre[1] = 0.0,
         _ => {}
     }
+    centre
+}
+
+/// Depth below the surface of the body, and the normal there, if `position` is inside.
+fn body<const D: usize>(configuration: &Configuration, position: &Vector<D>, spacing: f64) -> Option<(f64, Vector<D>)> {
+    let layout = choice(configuration, "layout");
+    let centre = centre(layout, position[0].round());
     let (radius, arm) = (if D == 2 { 2.6 } else { 1.7 } * spacing, position - centre);
     (layout.contains("body") && arm.norm() < radius).then(|| (radius - arm.norm(), arm.normalize()))
 }
@@ -312,8 +360,11 @@ fn outcome<const D: usize>(
         let mut simulation = Simulation::new(settings.clone(), particles, clock, Some(threads))?;
         simulation.poison(cut.is_some());
         if prescribes(configuration) {
-            simulation.forcing =
-                Forcing { body_force: Some(Box::new(wave)), surface_velocity: Some(Box::new(wave)), ..Forcing::default() };
+            let rules = [(); 2].map(|()| Some(Box::new(wave) as Rule<D>));
+            [simulation.forcing.body_force, simulation.forcing.surface_velocity] = rules;
+        }
+        if choice(configuration, "moves") == "told" {
+            simulation.forcing.motion = Some(motion(configuration, D));
         }
         Ok(simulation)
     };
@@ -326,7 +377,9 @@ fn outcome<const D: usize>(
             history.extend(simulation.take_history());
             let mut saved = simulation.particles().clone();
             saved.drop_images();
+            let poses = simulation.poses();
             simulation = start(shuffled(saved, random), simulation.clock(), 2)?;
+            simulation.set_poses(&poses)?;
         }
         simulation.advance(STEPS - cut.unwrap_or(0), None)?;
         history.extend(simulation.take_history());

@@ -130,6 +130,10 @@ impl<const D: usize> Scheme<D> for Alsph<D> {
     fn penalty(&self, _: f64) -> f64 {
         self.coefficients.penalty
     }
+
+    fn reach(&self, time_step: f64) -> f64 {
+        (self.penalty(time_step) * time_step + self.coefficients.sweeps.reach_squared()).sqrt()
+    }
 }
 
 /// θ ∇²u^m of particle `i`, and what stands beside it.

@@ -258,4 +258,8 @@ impl<const D: usize> Scheme<D> for Isph<D> {
     fn penalty(&self, time_step: f64) -> f64 {
         self.relaxed / time_step
     }
+
+    fn reach(&self, _: f64) -> f64 {
+        if self.is_explicit() { self.relaxed.sqrt() } else { f64::INFINITY }
+    }
 }

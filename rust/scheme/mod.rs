@@ -38,6 +38,12 @@ pub trait Scheme<const D: usize>: Send + Sync {
 
     /// r_AL of a step so long: c² Δt, c being the speed of the waves by which the scheme keeps ∇·u small.
     fn penalty(&self, time_step: f64) -> f64;
+
+    /// How far the pressure travels within a step so long, to which a free body needs an answer: c Δt, infinite where a Poisson equation is
+    /// solved, and zero where c is given and Δt has to follow it.
+    fn reach(&self, time_step: f64) -> f64 {
+        (self.penalty(time_step) * time_step).sqrt()
+    }
 }
 
 /// The scheme that the settings name.

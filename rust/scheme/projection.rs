@@ -46,12 +46,23 @@ pub struct Sweeps {
     relaxation: f64,
     /// One over the largest eigenvalue of the compact Laplacian: so much of it takes the shortest waves off.
     shortest: f64,
+    /// Whether there are any.
+    are_taken: bool,
 }
 
 impl Sweeps {
+    /// The square of how far a sweep carries the pressure.
+    pub fn reach_squared(self) -> f64 {
+        if self.are_taken { self.relaxation } else { 0.0 }
+    }
+
     pub fn new(settings: &Settings, largest: Eigenvalues) -> Self {
         let area = settings.particle_spacing.powi(2);
-        Self { relaxation: area / (EIGENVALUE_MARGIN * largest.projection), shortest: area / largest.laplacian }
+        Self {
+            relaxation: area / (EIGENVALUE_MARGIN * largest.projection),
+            shortest: area / largest.laplacian,
+            are_taken: settings.projection_sweeps > 0,
+        }
     }
 }
 
@@ -95,7 +106,7 @@ impl Projection {
     pub fn sweep<const D: usize>(
         &mut self,
         step: Step,
-        Sweeps { relaxation, shortest }: Sweeps,
+        Sweeps { relaxation, shortest, .. }: Sweeps,
         Flow { particles, frame, .. }: &mut Flow<D>,
         solenoidal: impl Fn(usize) -> f64 + Sync,
     ) {

@@ -151,4 +151,8 @@ impl<const D: usize> Scheme<D> for WeaklyCompressible<D> {
     fn penalty(&self, time_step: f64) -> f64 {
         self.sound_speed.powi(2) * time_step
     }
+
+    fn reach(&self, _: f64) -> f64 {
+        0.0
+    }
 }

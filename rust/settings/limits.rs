@@ -43,6 +43,14 @@ impl Settings {
         0.25 * (self.smoothing_length() / acceleration).sqrt()
     }
 
+    /// Speed of sound, if it is given.
+    pub fn sound_speed(&self) -> Option<f64> {
+        match self.scheme {
+            SchemeSettings::Wcsph { sound_speed, .. } | SchemeSettings::Edac { sound_speed, .. } => Some(sound_speed),
+            _ => None,
+        }
+    }
+
     fn acoustic_limit(&self, velocity_max: f64, largest: Eigenvalues) -> f64 {
         let spacing = self.particle_spacing;
         match self.scheme {

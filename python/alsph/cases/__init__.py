@@ -23,13 +23,16 @@ from alsph.cases.body import Body
 from alsph.cases.body_3d import Body3D
 from alsph.cases.cavity import Cavity
 from alsph.cases.channel import Channel
+from alsph.cases.concentric_release import ConcentricRelease
 from alsph.cases.couette import Couette
 from alsph.cases.cylinder import Cylinder
 from alsph.cases.cylinder_pair import CylinderPair
 from alsph.cases.dam_break import DamBreak
 from alsph.cases.elliptical_drop import EllipticalDrop
 from alsph.cases.free_surface import FreeSurface
+from alsph.cases.moving_cylinder import MovingCylinder
 from alsph.cases.nozzle import Nozzle
+from alsph.cases.oscillating_cylinder import OscillatingCylinder
 from alsph.cases.pipe import Pipe
 from alsph.cases.poiseuille import Poiseuille
 from alsph.cases.pressure_jump import PressureJump
@@ -42,6 +45,7 @@ from alsph.cases.standing_wave import StandingWave
 from alsph.cases.still_water import StillWater
 from alsph.cases.taylor_couette import TaylorCouette
 from alsph.cases.taylor_green import TaylorGreen
+from alsph.cases.towed_cylinder import TowedCylinder
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.parameters import suggest
@@ -51,6 +55,7 @@ CASES: dict[str, type[Case]] = {
     for case in (
         *(Cylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Nozzle, Bend, Cavity),
         *(Poiseuille, Couette, TaylorCouette, PulsatingChannel, Pipe, PressureJump, TaylorGreen),
+        *(OscillatingCylinder, TowedCylinder, ConcentricRelease),
         *(DamBreak, StandingWave, StillWater, Sloshing, EllipticalDrop, RotatingPatch),
     )
 }
@@ -65,6 +70,7 @@ __all__ = [
     "Case",
     "Cavity",
     "Channel",
+    "ConcentricRelease",
     "Couette",
     "DamBreak",
     "Cylinder",
@@ -72,7 +78,9 @@ __all__ = [
     "Domain",
     "EllipticalDrop",
     "FreeSurface",
+    "MovingCylinder",
     "Nozzle",
+    "OscillatingCylinder",
     "Pipe",
     "Poiseuille",
     "PressureJump",
@@ -86,6 +94,7 @@ __all__ = [
     "StillWater",
     "TaylorCouette",
     "TaylorGreen",
+    "TowedCylinder",
     "find",
 ]
 

@@ -16,7 +16,7 @@ SECOND = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / (12 * INTERVAL**2)
 
 
 def poses(rule: Rule, centres: FloatArray, time: float) -> FloatArray:
-    """Return the poses (b, 18) of bodies that a rule moves from where they are at the time 0.
+    """Return the poses (b, 24) of bodies that a rule moves from where they are at the time 0.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def poses(rule: Rule, centres: FloatArray, time: float) -> FloatArray:
     -------
     ndarray
         Displacement, rotation vector, velocity, angular velocity, acceleration and angular acceleration, each of three
-        components.
+        components, and six that only free bodies have.
     """
     start = _placed(rule, centres, 0.0)
     way, turn = zip(*(_placed(rule, centres, time + k * INTERVAL) for k in range(-2, 3)), strict=True)
@@ -43,7 +43,7 @@ def poses(rule: Rule, centres: FloatArray, time: float) -> FloatArray:
         angle = (now * back).as_rotvec()
         away = [(Rotation.from_rotvec(each) * now.inv()).as_rotvec() for each in turn]
     rates = [np.tensordot(weights, np.stack(of), 1) for weights in (FIRST, SECOND) for of in (way, away)]
-    return np.hstack([way[2] - start[0], angle, *rates])
+    return np.hstack([way[2] - start[0], angle, *rates, np.zeros((len(centres), 6))])
 
 
 def _placed(rule: Rule, centres: FloatArray, time: float) -> tuple[FloatArray, FloatArray]:

@@ -13,6 +13,9 @@ from alsph.arrays import AXES, FloatArray
 from alsph.cases.base import Case
 from alsph.geometry.particles import Snapshot
 
+PARTS = ("pressure", "viscous")
+"""Of the loads on a body."""
+
 
 @dataclass(frozen=True, eq=False)
 class Ledger:
@@ -104,13 +107,28 @@ def _wall_power(run: Record, case: Case) -> FloatArray:
     power = np.zeros_like(run.history["time"])
     if "sliding" in case.rules:  # which the force on the whole body does not tell
         return np.full_like(power, np.nan)
+    moved = case.moved_bodies if "motion" in case.rules else []
     for body in case.checked_bodies:
+        if body.name in moved or body.rigid:
+            power += _rigid_power(run.history, body.name)
+            continue
         if body.velocity is None:
             return np.full_like(power, np.nan)
         for axis, speed in zip(AXES, body.velocity, strict=False):
-            for part in ("pressure", "viscous"):
+            for part in PARTS:
                 power -= speed * run.history[f"{body.name}_{part}_force_{axis}"]
     return power
+
+
+def _rigid_power(history: dict[str, FloatArray], body: str) -> FloatArray:
+    """Return that of a rigid body: minus force and torque times its velocity and angular velocity."""
+    pairs = [(f"{body}_{part}_force_{axis}", f"{body}_velocity_{axis}") for part in PARTS for axis in AXES]
+    pairs += [
+        (f"{body}_{part}_torque{axis}", f"{body}_angular_velocity{axis}")
+        for part in PARTS
+        for axis in ("", *(f"_{axis}" for axis in AXES))
+    ]
+    return -np.asarray(sum(history[load] * history[speed] for load, speed in pairs if load in history))
 
 
 def _budget(snapshot: Snapshot, case: Case) -> tuple[float, float]:

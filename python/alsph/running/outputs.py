@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from alsph.analysis.sampling import in_solid
 from alsph.arrays import FloatArray
+from alsph.cases.base import Case
 from alsph.config import Config
 from alsph.engine.output import Output
 from alsph.engine.simulation import Simulation
@@ -68,15 +69,30 @@ class Planes(Samples):
 
 
 class SurfacePressure(Samples):
-    """C_p = (p - p_0) / (½ρU²) on a surface, with p_0 the pressure at the inlet."""
+    """C_p = (p - p_0) / (½ρU²) on the surface of bodies, with p_0 the pressure at the inlet.
 
-    def __init__(self, points: Surface, interval: float) -> None:
+    The points go along with bodies that move; those that are kept are where these were at the start.
+    """
+
+    def __init__(self, points: Surface, interval: float, case: Case) -> None:
         super().__init__("surface.h5", interval, points.arrays())
+        bodies = {body.name: (number, body.center) for number, body in enumerate(case.checked_bodies)}
+        of_parts = [bodies[name] for name in case.surface_bodies]
+        self.bodies, self.centres = (np.array(each)[points.part.astype(int)] for each in zip(*of_parts, strict=True))
 
     def sample(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> dict[str, FloatArray]:
         """Return C_p."""
-        pressure = super().sample(simulation, rows)["pressure"]
+        pressure = simulation.sample(self._now(rows))["pressure"]
         return {"pressure_coefficient": 2 * (pressure - rows["inlet_pressure"][-1])}
+
+    def _now(self, rows: Mapping[str, NDArray[Any]]) -> FloatArray:
+        """Return where the points (m, 2) are."""
+        position: FloatArray = self.points["position"]
+        if "displacement" not in rows:
+            return position
+        way, angle = (rows[name][-1, self.bodies] for name in ("displacement", "angle"))
+        (x, y), cos, sin = (position - self.centres).T, np.cos(angle[:, 0]), np.sin(angle[:, 0])
+        return np.asarray(self.centres + way + np.stack([cos * x - sin * y, sin * x + cos * y], axis=1))
 
 
 def remarks_of(config: Config, state: Mapping[str, Any]) -> list[str]:
@@ -130,7 +146,7 @@ def _samples_of(config: Config) -> Iterator[Samples]:
     run, points, probes = config.run, config.case.surface_points(), config.probes
     planes = [lattice(*axes) for axes in config.planes]
     if points:
-        yield SurfacePressure(points, run.surface_interval)
+        yield SurfacePressure(points, run.surface_interval, config.case)
     if len(probes):
         yield Samples("probes.h5", run.probe_interval or PROBE_INTERVAL, {"position": probes})
     if planes:

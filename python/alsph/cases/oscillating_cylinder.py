@@ -1,0 +1,98 @@
+"""A cylinder that oscillates in a fluid at rest."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field
+
+from alsph import reference
+from alsph.analysis.measures import Measure, Profile
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
+from alsph.cases.moving_cylinder import MovingCylinder
+
+KNOWN = {"reynolds": 100.0, "keulegan_carpenter": 5.0}
+MORISON = {"drag coefficient of Morison": 2.03, "inertia coefficient of Morison": 1.457}
+SOURCE = "vorticity and stream function on a log-polar grid to 40 D, extrapolated"
+
+
+class OscillatingCylinder(MovingCylinder):
+    """A cylinder that oscillates along x in a fluid at rest: x = -A sin(2πt/T); U is its largest speed 2πA/T.
+
+    At Re = 100 and KC = UT/D = 5 the flow is periodic and symmetric (Dütsch et al., J. Fluid Mech. 360, 1998, 249),
+    and the force is known. Drag and inertia coefficients are those of Morison's formula, F = -c_d ρDV|V|/2 -
+    c_m ρπD²/4 dV/dt with the velocity V of the cylinder, fitted to the last whole period.
+    """
+
+    name: ClassVar[str] = "oscillating_cylinder"
+    title: ClassVar[str] = "a cylinder that oscillates in a fluid at rest"
+    later_names: ClassVar[tuple[str, ...]] = ("largest force coefficient", *MORISON, "force coefficient over")
+
+    keulegan_carpenter: float = Field(default=5.0, gt=0, description="Keulegan-Carpenter number KC = UT/D [-]")
+
+    @property
+    def period(self) -> float:
+        """T [D/U]."""
+        return self.keulegan_carpenter
+
+    @property
+    def default_until(self) -> float:
+        """Three periods."""
+        return 3 * self.period
+
+    def motion(self, position: FloatArray, time: float) -> ArrayLike:
+        """Return how far the cylinder has come [D]."""
+        turn = 2 * np.pi / self.period
+        return [-np.sin(turn * time) / turn, 0.0]
+
+    def last_period(self, run: Record) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+        """Return t/T from 0 to 1, force coefficient and velocity of the last whole period; None before the first."""
+        time = run.history["time"]
+        count = math.floor((time[-1] + 0.5 * self.particle_spacing) / self.period) if len(time) else 0
+        if count < 1 or "cylinder_velocity_x" not in run.history:
+            return None
+        within = (time > (count - 1) * self.period) & (time <= count * self.period)
+        share = time[within] / self.period - (count - 1)
+        return share, run.history["drag_coefficient"][within], run.history["cylinder_velocity_x"][within]
+
+    def measures(self, run: Record) -> list[Measure]:
+        """Return the largest force coefficient and Morison's coefficients over the last whole period."""
+        last = self.last_period(run)
+        if last is None:
+            return []
+        share, force, velocity = last
+        turn = 2 * np.pi / self.period
+        acceleration = turn * np.sin(2 * np.pi * share)
+        terms = np.stack([-velocity * np.abs(velocity), -np.pi / 2 * acceleration], axis=1)
+        fitted = np.linalg.lstsq(terms, force, rcond=None)[0]
+        known = self.is_known
+        return [
+            Measure(
+                "largest force coefficient", float(np.abs(force).max()), 3.25 if known else math.nan, 0.05, SOURCE
+            ),
+            *(
+                Measure(name, float(value), expected if known else math.nan, 0.05, SOURCE)
+                for (name, expected), value in zip(MORISON.items(), fitted, strict=True)
+            ),
+        ]
+
+    def profiles(self, run: Record) -> list[Profile]:
+        """Return the force coefficient over the last whole period."""
+        last = self.last_period(run)
+        if last is None:
+            return []
+        known, source = (np.empty(0), np.empty(0)), ""
+        if self.is_known:
+            share, force, *_ = reference.table("oscillating_cylinder_force.csv")
+            known, source = (share, force), SOURCE
+        axes = ("$t/T$", "$C_x$")
+        return [Profile("force coefficient over the last period", axes, last[:2], known, source)]
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the force of this flow is known."""
+        return all(getattr(self, name) == value for name, value in KNOWN.items())

@@ -1,0 +1,271 @@
+//! Bodies that move as rigid ones: they keep their shape, the fluid feels them as it should, and free ones obey Newton and Euler.
+
+use alsph::motion::{MotionRule, Pose};
+use alsph::{Clock, ParticleKind, Particles, Simulation, Vector};
+use approx::assert_relative_eq;
+use nalgebra::Vector3;
+use serde_json::{Value, json};
+use std::f64::consts::{PI, TAU};
+
+mod common;
+
+const SIDE: usize = 24;
+
+/// A periodic box of fluid around a disc or ball of radius [`common::RADIUS`], and its settings: the body moves, by a rule unless `rigid`.
+fn body_in_fluid(rigid: Value, change: &[(&str, Value)]) -> (Value, Particles<2>) {
+    let spacing = 1.0 / SIDE as f64;
+    let mut value = common::settings_value::<2>(spacing, "periodic");
+    let defaults = [
+        ("wall_velocity", json!("cubic")),
+        ("wall_pressure", json!("linear")),
+        ("derivative_frame", json!("midpoint")),
+        ("max_iterations", json!(2)),
+        ("projection_sweeps", json!(4)),
+        ("sweep_weights", json!("chebyshev")),
+        ("viscous_theta", json!(0.5)),
+        ("penalty_constant", Value::Null),
+        ("courant", json!(0.2)),
+        ("time_step", json!(0.2 * spacing)),
+        ("shifting", json!("strain")),
+        ("shift_coefficient", json!(0.75)),
+    ];
+    defaults.iter().chain(change).for_each(|(key, chosen)| value[*key] = chosen.clone());
+    value["bodies"] = json!([{"name": "body", "velocity": null, "moves": true, "center": [0.5, 0.5], "rigid": rigid}]);
+    let mut particles = common::cylinder(SIDE, 4);
+    for i in (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Solid) {
+        let arm = particles.position[i].add_scalar(-0.5);
+        (particles.normal[i], particles.depth[i]) = (arm.normalize(), common::RADIUS - arm.norm());
+    }
+    (value, particles)
+}
+
+fn simulation(value: &Value, particles: &Particles<2>, motion: Option<MotionRule>) -> Simulation<2> {
+    let mut simulation = Simulation::new(common::parse(value), particles.clone(), Clock::default(), Some(2)).expect("valid");
+    simulation.forcing.motion = motion;
+    simulation
+}
+
+fn told(pose: impl Fn(f64) -> Pose + Send + Sync + 'static) -> Option<MotionRule> {
+    Some(Box::new(move |time| Ok(vec![pose(time)])))
+}
+
+/// One that swings and turns.
+fn swing(time: f64) -> Pose {
+    let (sin, cos) = (TAU * time).sin_cos();
+    Pose {
+        displacement: Vector3::new(0.1 * sin, 0.05 * (1.0 - cos), 0.0),
+        velocity: Vector3::new(0.1 * cos, 0.05 * sin, 0.0) * TAU,
+        acceleration: Vector3::new(-0.1 * sin, 0.05 * cos, 0.0) * TAU.powi(2),
+        angle: Vector3::z() * (3.0 * time),
+        spin: Vector3::z() * 3.0,
+        ..Pose::default()
+    }
+}
+
+/// Where the solids are, by id.
+fn solids(particles: &Particles<2>) -> Vec<(u64, Vector<2>, Vector<2>, Vector<2>)> {
+    let solid = |&i: &usize| particles.kind[i] == ParticleKind::Solid;
+    let of = |i: usize| (particles.id[i], particles.position[i], particles.normal[i], particles.velocity[i]);
+    let mut found: Vec<_> = (0..particles.real).filter(solid).map(of).collect();
+    found.sort_by_key(|each| each.0);
+    found
+}
+
+/// After many steps each solid is where the rule has it, with the normal and the velocity there, however far the body has come, and across
+/// periodic sides.
+#[test]
+fn a_body_keeps_its_shape_wherever_it_goes() {
+    for frame in ["midpoint", "initial", "updated"] {
+        let (value, particles) = body_in_fluid(Value::Null, &[("derivative_frame", json!(frame))]);
+        // Twice through the box.
+        let through = |time: f64| Pose {
+            displacement: Vector3::x() * (2.0 * time),
+            velocity: Vector3::x() * 2.0,
+            ..swing(0.3 * time)
+        };
+        let mut simulation = simulation(&value, &particles, told(through));
+        simulation.advance_until(1.0, None).expect("stable");
+        let (time, pose) = (simulation.clock().time, through(simulation.clock().time));
+        assert!(simulation.clock().step > 100 && time >= 1.0);
+        let (sin, cos) = pose.angle.z.sin_cos();
+        for ((_, start, ..), (_, now, normal, velocity)) in
+            solids(&particles).into_iter().zip(solids(simulation.particles()))
+        {
+            let arm = start.add_scalar(-0.5);
+            let turned = Vector::from([cos * arm[0] - sin * arm[1], sin * arm[0] + cos * arm[1]]);
+            let place = turned.add_scalar(0.5) + Vector::from([pose.displacement.x, pose.displacement.y]);
+            let away = (place - now).map(|x| x - x.round());
+            assert!(away.norm() < 1e-9, "{frame}: {away:?}");
+            assert!((0.0..1.0).contains(&now[0]) && (0.0..1.0).contains(&now[1]));
+            assert_relative_eq!(normal, turned.normalize(), epsilon = 1e-7);
+            let speed = Vector::from([2.0 - pose.spin.z * turned[1], pose.velocity.y + pose.spin.z * turned[0]]);
+            assert_relative_eq!(velocity, speed, epsilon = 1e-6);
+        }
+    }
+}
+
+/// A body that moves through a fluid at rest feels what the same body at rest does in a stream, the whole being seen from a frame that
+/// moves evenly.
+#[test]
+fn forces_are_those_of_the_stream_past_a_body_at_rest() {
+    for scheme in [
+        json!({"kind": "alsph"}),
+        json!({"kind": "isph", "pressure_share": 0.9, "solver": "bicgstab", "tolerance": 1e-4, "max_solver_iterations": 100}),
+        json!({"kind": "wcsph", "sound_speed": 10, "density_diffusion": "antuono", "diffusion_coefficient": 0.1}),
+    ] {
+        // In steps of one length, else those of the fluid at rest are longer.
+        let step = json!(0.1 / SIDE as f64);
+        let even =
+            [("scheme", scheme.clone()), ("adaptive_time_step", json!(false)), ("time_step", step), ("courant", json!(0.2))];
+        let (value, particles) = body_in_fluid(Value::Null, &even);
+        let still = told(|_| Pose::default());
+        let towed = told(|time| Pose { displacement: -Vector3::x() * time, velocity: -Vector3::x(), ..Pose::default() });
+        let mut streaming = particles.clone();
+        (0..streaming.real)
+            .filter(|&i| particles.kind[i] == ParticleKind::Fluid)
+            .for_each(|i| streaming.velocity[i][0] = 1.0);
+        let drag = |particles: &Particles<2>, motion| {
+            let mut simulation = simulation(&value, particles, motion);
+            simulation.advance(100, None).expect("stable");
+            let late = simulation.take_history().split_off(20);
+            late.iter().map(|report| (report.loads[0].pressure_force + report.loads[0].viscous_force)[0]).sum::<f64>()
+                / late.len() as f64
+        };
+        let (stream, towed) = (drag(&streaming, still), drag(&particles, towed));
+        assert!(stream > 0.05, "no drag to compare: {stream}");
+        assert_relative_eq!(towed, stream, max_relative = 0.05);
+    }
+}
+
+/// A free disc on a spring in a fluid so thin that it does not matter swings as a spring does; so does one that turns keep its angular
+/// velocity, beside what viscosity takes.
+#[test]
+fn a_heavy_body_obeys_newton() {
+    let (mass, stiffness) = (500.0, 500.0 * (TAU / 0.5f64).powi(2));
+    let rigid = json!({
+        "mass": mass, "inertia": [15.0], "force": [0.0, -0.02 * stiffness], "stiffness": [stiffness, stiffness], "damping": [0.0, 0.0],
+        "free": [true, true, true], "added_mass": 0.3, "added_inertia": 0.01,
+    });
+    let (value, particles) = body_in_fluid(rigid, &[("courant", json!(0.1)), ("time_step", json!(0.05 / SIDE as f64))]);
+    let mut simulation = simulation(&value, &particles, None);
+    let turning = Pose { spin: Vector3::z(), ..Pose::default() };
+    simulation.set_poses(&[turning]).expect("one body");
+    simulation.advance_until(0.5, None).expect("stable");
+    let history = simulation.take_history();
+    let lowest = history.iter().map(|report| report.poses[0].displacement.y).fold(0.0, f64::min);
+    assert_relative_eq!(lowest, -0.04, max_relative = 0.02);
+    let last = history.last().expect("steps were taken").poses[0];
+    assert!(last.displacement.y.abs() < 1e-3, "{last:?}");
+    assert_relative_eq!(last.angle.z, 0.5, max_relative = 0.02);
+}
+
+/// What begins to move drags fluid along, as an array of discs does.
+#[test]
+fn the_fluid_answers_with_the_mass_that_is_dragged_along() {
+    let displaced = PI * common::RADIUS.powi(2);
+    for density in [0.1, 2.0] {
+        let mass = density * displaced;
+        let rigid = json!({
+            "mass": mass, "inertia": [1.0], "force": [mass, 0.0], "stiffness": [0.0, 0.0], "damping": [0.0, 0.0],
+            "free": [true, true, true], "added_mass": 1.5 * displaced, "added_inertia": 0.0,
+        });
+        let solve = json!({"kind": "isph", "pressure_share": 0.9, "solver": "bicgstab", "tolerance": 1e-6, "max_solver_iterations": 100});
+        let thin = [("scheme", solve), ("kinematic_viscosity", json!(1e-5)), ("courant", json!(0.1))];
+        let (value, particles) = body_in_fluid(rigid, &thin);
+        let mut simulation = simulation(&value, &particles, None);
+        simulation.advance(25, None).expect("stable");
+        let report = simulation.take_history().pop().expect("steps were taken");
+        let added = (mass / report.poses[0].acceleration.x - mass) / displaced;
+        // Relative to the mean flow C = (1 + φ)/(1 − φ) in an array of which the discs fill φ, and without a mean pressure gradient
+        // that flow goes along with φ (1 + C) / (1 + φ (1 + C)) of the acceleration.
+        let coefficient = (1.0 + displaced) / (1.0 - displaced);
+        let along = displaced * (1.0 + coefficient) / (1.0 + displaced * (1.0 + coefficient));
+        assert_relative_eq!(added, coefficient * (1.0 - along) - along, max_relative = 0.03);
+    }
+}
+
+/// In space a free body that turns about none of its principal axes tumbles, and keeps energy and angular momentum.
+#[test]
+fn a_body_in_space_tumbles() {
+    let spacing = 1.0 / 10.0;
+    let mut value = common::settings_value::<3>(spacing, "periodic");
+    (value["kinematic_viscosity"], value["wall_pressure"], value["wall_velocity"]) =
+        (json!(1e-6), json!("linear"), json!("adami"));
+    (value["time_step"], value["max_iterations"]) = (json!(2e-3), json!(1));
+    let inertia = [1000.0, 2000.0, 3000.0];
+    value["bodies"] = json!([{"name": "body", "velocity": null, "moves": true, "center": [0.5, 0.5, 0.5], "rigid": {
+        "mass": 1e4, "inertia": [inertia[0], 0, 0, 0, inertia[1], 0, 0, 0, inertia[2]], "force": [0.0, 0.0, 0.0],
+        "stiffness": [0.0, 0.0, 0.0], "damping": [0.0, 0.0, 0.0], "free": [true, true, true, true, true, true],
+        "added_mass": 0.1, "added_inertia": 0.01,
+    }}]);
+    let mut particles = common::particles(common::lattice::<3>(10, 0.0));
+    for i in 0..particles.real {
+        let arm = particles.position[i].add_scalar(-0.5);
+        if arm.norm() < 0.26 {
+            particles.kind[i] = ParticleKind::Solid;
+            (particles.normal[i], particles.depth[i]) = (arm.normalize(), 0.26 - arm.norm());
+        }
+    }
+    let mut simulation = Simulation::<3>::new(common::parse(&value), particles, Clock::default(), Some(2)).expect("valid");
+    let spin = Vector3::new(0.02, 3.0, 0.02);
+    simulation.set_poses(&[Pose { spin, ..Pose::default() }]).expect("one body");
+    simulation.advance_until(0.4, None).expect("stable");
+    let pose = simulation.poses()[0];
+    let turn = nalgebra::Rotation3::from_scaled_axis(pose.angle);
+    let own = turn.inverse() * pose.spin;
+    let of = |spin: &Vector3<f64>| Vector3::new(inertia[0] * spin.x, inertia[1] * spin.y, inertia[2] * spin.z);
+    assert_relative_eq!(turn * of(&own), of(&spin), epsilon = 60.0);
+    assert_relative_eq!(own.dot(&of(&own)), spin.dot(&of(&spin)), max_relative = 0.01);
+    // Euler's equations about the middle axis, linear in the rest: ω₁' = −Ω ω₃, ω₃' = −Ω ω₁/3.
+    let grown = 3f64.sqrt() * simulation.clock().time;
+    let euler = [grown.cosh() - 3f64.sqrt() * grown.sinh(), grown.cosh() - grown.sinh() / 3f64.sqrt()].map(|x| 0.02 * x);
+    assert_relative_eq!(own.x, euler[0], epsilon = 5e-4);
+    assert_relative_eq!(own.z, euler[1], epsilon = 5e-4);
+}
+
+/// What cannot be is refused, and says what.
+#[test]
+fn motions_that_cannot_be_are_refused() {
+    let (value, particles) = body_in_fluid(Value::Null, &[]);
+    let error = simulation(&value, &particles, None).advance(1, None).expect_err("no rule").to_string();
+    assert!(error.contains("neither a velocity nor a rule"), "{error}");
+    let error = simulation(&value, &particles, Some(Box::new(|_| Ok(Vec::new()))))
+        .advance(1, None)
+        .expect_err("no pose")
+        .to_string();
+    assert!(error.contains("0 bodies, where 1 are moved"), "{error}");
+    let nan = told(|time| Pose { velocity: Vector3::x() * (0.0 / (0.01 - time).max(0.0)), ..Pose::default() });
+    let error = simulation(&value, &particles, nan).advance_until(1.0, None).expect_err("NaN").to_string();
+    assert!(error.contains("not finite"), "{error}");
+    let error = simulation(&value, &particles, None).set_poses(&[]).expect_err("no body").to_string();
+    assert!(error.contains("24 finite numbers for each of 1 bodies"), "{error}");
+    for (key, wrong, told) in [
+        ("mass", json!(0.0), "rigid.mass"),
+        ("inertia", json!([1.0, 2.0]), "rigid.inertia"),
+        ("free", json!([true]), "rigid.free"),
+        ("added_mass", json!(-1.0), "rigid.added_mass"),
+        ("force", json!([1.0]), "rigid.force"),
+    ] {
+        let mut rigid = json!({
+            "mass": 1.0, "inertia": [1.0], "force": [0.0, 0.0], "stiffness": [0.0, 0.0], "damping": [0.0, 0.0],
+            "free": [true, true, true], "added_mass": 0.0, "added_inertia": 0.0,
+        });
+        rigid[key] = wrong;
+        let (value, _) = body_in_fluid(rigid, &[]);
+        let error = alsph::Settings::from_json(&value.to_string()).expect_err("wrong").to_string();
+        assert!(error.contains(told), "{error}");
+    }
+    let (value, _) = body_in_fluid(Value::Null, &[("wall_pressure", json!("paper"))]);
+    let error = alsph::Settings::from_json(&value.to_string()).expect_err("the paper's walls do not move").to_string();
+    assert!(error.contains("wall_pressure"), "{error}");
+}
+
+/// A body that comes to a side of the domain is told of by its name.
+#[test]
+fn a_body_at_a_side_is_told_of() {
+    let (mut value, particles) = body_in_fluid(Value::Null, &[]);
+    value["domain"]["boundaries"] = json!([["slip", "slip"], ["slip", "slip"]]);
+    let towed = told(|time| Pose { displacement: Vector3::x() * time, velocity: Vector3::x(), ..Pose::default() });
+    let error = simulation(&value, &particles, towed).advance_until(0.5, None).expect_err("it is narrow").to_string();
+    assert!(error.contains("body \"body\" has reached a side") || error.contains("diverged"), "{error}");
+}
