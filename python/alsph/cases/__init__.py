@@ -38,6 +38,7 @@ from alsph.cases.poiseuille import Poiseuille
 from alsph.cases.pressure_jump import PressureJump
 from alsph.cases.pulsating_channel import PulsatingChannel
 from alsph.cases.rotating_patch import RotatingPatch
+from alsph.cases.settling_sphere import SettlingSphere
 from alsph.cases.sloshing import Sloshing
 from alsph.cases.spatial import Spatial
 from alsph.cases.sphere import Sphere
@@ -55,7 +56,7 @@ CASES: dict[str, type[Case]] = {
     for case in (
         *(Cylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Nozzle, Bend, Cavity),
         *(Poiseuille, Couette, TaylorCouette, PulsatingChannel, Pipe, PressureJump, TaylorGreen),
-        *(OscillatingCylinder, TowedCylinder, ConcentricRelease),
+        *(OscillatingCylinder, TowedCylinder, ConcentricRelease, SettlingSphere),
         *(DamBreak, StandingWave, StillWater, Sloshing, EllipticalDrop, RotatingPatch),
     )
 }
@@ -86,6 +87,7 @@ __all__ = [
     "PressureJump",
     "PulsatingChannel",
     "RotatingPatch",
+    "SettlingSphere",
     "Sloshing",
     "SolidBody",
     "Spatial",

@@ -137,11 +137,6 @@ class Case(Driven):
         ]
         return round(math.prod(columns))
 
-    @property
-    def coefficient_bodies(self) -> list[str]:
-        """Names of the bodies that drag and lift are those of, all together."""
-        return []
-
     def surface_points(self) -> Surface | None:
         """Return where the surface pressure is sampled."""
         return None
@@ -249,12 +244,6 @@ class Case(Driven):
         if "motion" in self.rules and body.name in self.moved_bodies:
             return {"velocity": None, "moves": True}
         return {"velocity": None} if "sliding" in self.rules and not body.moves else {}
-
-    @property
-    def moved_bodies(self) -> list[str]:
-        """Names of the bodies that :meth:`motion` moves."""
-        told = [body.name for body in self.checked_bodies if body.moves and body.velocity is None]
-        return told or list(self.coefficient_bodies)
 
     def build(self, threads: int | None = None) -> Problem:
         """Return the problem that the engine starts from.

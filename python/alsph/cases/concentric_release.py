@@ -92,7 +92,9 @@ class ConcentricRelease(Case):
         square = (count * self.particle_spacing) ** 2
         corner = np.full(2, count * self.particle_spacing / 2)
         cells = lattice(*[symmetric_centres(count, self.particle_spacing)] * 2)
-        return pack(cells, Volume(height, -corner, corner, square - self.fluid_volume(), 1.0), solid, self.particle_spacing)
+        return pack(
+            cells, Volume(height, -corner, corner, square - self.fluid_volume(), 1.0), solid, self.particle_spacing
+        )
 
     @property
     def added_mass_coefficient(self) -> float:

@@ -63,6 +63,8 @@ class Driven(Dimensional):
                 raise ConfigError(f"{name}: {type(self).__name__} says that itself, by its method `{method}`")
         if self.inlet_velocity is not None and not any(self.checked_domain.inlets()):
             raise ConfigError(f"inlet_velocity = {shown(self.inlet_velocity)}: {self.name} has no inlet")
+        if self.body_motion is not None and not self.moved_bodies:
+            raise ConfigError(f"body_motion = {shown(self.body_motion)}: {self.name} has no body to move")
         if self.surface_velocity is not None and all(body.moves for body in self.checked_bodies):
             raise ConfigError(f"surface_velocity = {shown(self.surface_velocity)}: {self.name} has no body in place")
         return self
@@ -93,6 +95,18 @@ class Driven(Dimensional):
     def checked_bodies(self) -> list[SolidBody]:
         """What :meth:`bodies` gives, which in older cases are tables."""
         return [SolidBody.of(body) for body in self.bodies()]
+
+    @property
+    def moved_bodies(self) -> list[str]:
+        """Names of the bodies that :meth:`motion` moves."""
+        told = [body.name for body in self.checked_bodies if body.moves and body.velocity is None and not body.rigid]
+        free = {body.name for body in self.checked_bodies if body.rigid}
+        return told or [name for name in self.coefficient_bodies if name not in free]
+
+    @property
+    def coefficient_bodies(self) -> list[str]:
+        """Names of the bodies that drag and lift are those of, all together."""
+        return []
 
     def body_force(self) -> list[float]:
         """Return the body force per unit mass (d,) [U²/D]."""

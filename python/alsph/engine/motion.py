@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from typing import Any
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from alsph.arrays import FloatArray
-from alsph.engine.prescribed import Rule, asked
+from alsph.engine.prescribed import Prescription, Rule, asked
 
 INTERVAL = 1e-3
 """Between the times of which velocities and accelerations are formed, to fourth order [D/U]."""
@@ -44,6 +47,23 @@ def poses(rule: Rule, centres: FloatArray, time: float) -> FloatArray:
         away = [(Rotation.from_rotvec(each) * now.inv()).as_rotvec() for each in turn]
     rates = [np.tensordot(weights, np.stack(of), 1) for weights in (FIRST, SECOND) for of in (way, away)]
     return np.hstack([way[2] - start[0], angle, *rates, np.zeros((len(centres), 6))])
+
+
+def answering_poses(
+    rule: Rule, centres: FloatArray, prescribed: dict[str, Prescription]
+) -> Callable[[float], FloatArray]:
+    """Return what the engine asks of a rule for motions, whose last answer is kept."""
+
+    def answer(time: float) -> FloatArray:
+        prescribed["motion"] = Prescription(time, centres, np.array(asked("motion", rule, centres, time)))
+        return poses(rule, centres, time)
+
+    return answer
+
+
+def is_rigid(body: Mapping[str, Any]) -> bool:
+    """Whether a body of the engine's settings moves as a rigid one."""
+    return bool(body["moves"] and body["velocity"] is None)
 
 
 def _placed(rule: Rule, centres: FloatArray, time: float) -> tuple[FloatArray, FloatArray]:

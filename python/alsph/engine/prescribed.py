@@ -89,10 +89,24 @@ def asked(name: str, rule: Rule, position: FloatArray, time: float) -> FloatArra
         vectors = np.empty(0)
     dimensions = position.shape[1]
     numbers = [dimensions, 3 if dimensions == 2 else 6] if name == "motion" else [dimensions]
-    if vectors.shape[-1:] not in {(number,) for number in numbers} or vectors.shape[:-1] not in {(), position.shape[:1]}:
+    if vectors.shape[-1:] not in {(number,) for number in numbers} or vectors.shape[:-1] not in {
+        (),
+        position.shape[:1],
+    }:
         told = " or ".join(map(str, numbers))
         raise ConfigError(f"{name}: the function must give {told} numbers a position, or as many")
     return np.broadcast_to(vectors, (len(position), vectors.shape[-1]))
+
+
+def answering(name: str, rule: Rule, prescribed: dict[str, Prescription]) -> Callable[[FloatArray, float], FloatArray]:
+    """Return what the engine asks: a rule, whose last answers are kept. It holds no simulation, which holds it."""
+
+    def answer(position: FloatArray, time: float) -> FloatArray:
+        values = np.ascontiguousarray(asked(name, rule, position, time))
+        prescribed[name] = Prescription.of(time, position, values)
+        return values
+
+    return answer
 
 
 def difference(rules: Mapping[str, Rule], then: Mapping[str, Prescription]) -> str:

@@ -7,7 +7,7 @@ import os
 import threading
 import time as clock
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 import alsph._alsph as _alsph
 from alsph.arrays import FloatArray
-from alsph.engine.motion import poses
-from alsph.engine.prescribed import Prescription, Rule, asked, backflow
+from alsph.engine.motion import answering_poses, is_rigid
+from alsph.engine.prescribed import Prescription, Rule, answering, backflow
 from alsph.engine.problem import Problem
 from alsph.errors import ConfigError, SharedError, SolverError
 from alsph.geometry.domain import Domain
@@ -154,7 +154,8 @@ class Simulation:
     Attributes
     ----------
     rules : dict of function
-        Those that :meth:`set_inflow` and :meth:`prescribe` were given: ``inflow``, ``forcing``, ``sliding``, ``motion``.
+        Those that :meth:`set_inflow` and :meth:`prescribe` were given: ``inflow``, ``forcing``, ``sliding`` and
+        ``motion``.
     prescribed : dict of Prescription
         What they gave for the last step.
     backflow : str
@@ -330,7 +331,7 @@ class Simulation:
         """
         with self._engine() as engine:
             rows = engine.take_history()
-        if not any(_is_rigid(body) for body in self.problem.settings["bodies"]):
+        if not any(is_rigid(body) for body in self.problem.settings["bodies"]):
             rows = {name: values for name, values in rows.items() if name not in MOTION}
         rows = {"step": rows["step"], **rows, **self._coefficients(rows)}
         if keep and len(rows["step"]):
@@ -410,8 +411,8 @@ class Simulation:
             they are, as those of a cylinder that rotates; without, that of the state.
         motion
             Likewise how far the bodies that move, but have neither a ``velocity`` nor are ``rigid``, have come (b, d)
-            [D], or with the angles that they have turned by behind that, (b, 3) in 2-D and as a rotation vector (b, 6) in
-            3-D [rad]; of their centres at the start (b, d) and the time. Where they are at the time 0 is taken off.
+            [D], of their centres at the start (b, d) and the time; or (b, 3) in 2-D and (b, 6) in 3-D, with the angle,
+            as a vector in 3-D, that they have turned by behind it [rad]. What it gives at the time 0 is taken off.
 
         Raises
         ------
@@ -449,19 +450,19 @@ class Simulation:
 
     def _hand_over(self) -> None:
         """Give the engine the rules that it asks itself."""
+        forcing, sliding = (
+            answering(name, self.rules[name], self.prescribed) if name in self.rules else None
+            for name in ("forcing", "sliding")
+        )
+        moving = self.rules.get("motion")
+        motion = moving and answering_poses(moving, self._told_centres(), self.prescribed)
         with self._engine() as engine:
-            engine.prescribe(
-                *(
-                    _answer(name, self.rules[name], self.prescribed) if name in self.rules else None
-                    for name in ("forcing", "sliding")
-                ),
-                _motion(self.rules["motion"], self._told_centres(), self.prescribed) if "motion" in self.rules else None,
-            )
+            engine.prescribe(forcing, sliding, motion)
 
     def _told_centres(self) -> FloatArray:
         """Return the centres (b, d) of the bodies that a rule moves."""
         bodies = self.problem.settings["bodies"]
-        told = [body["center"] for body in bodies if _is_rigid(body) and not body.get("rigid")]
+        told = [body["center"] for body in bodies if is_rigid(body) and not body.get("rigid")]
         return np.array(told, float).reshape(len(told), self.problem.dimensions)
 
     def _prescribe(self, steps: int) -> int:
@@ -502,33 +503,6 @@ class Simulation:
         if "inflow" in self.rules:
             self.set_inflow(self.rules["inflow"])
         self.prescribe(**{name: self.rules.get(name) for name in ("forcing", "sliding", "motion")})
-
-
-def _answer(name: str, rule: Rule, prescribed: dict[str, Prescription]) -> Callable[[FloatArray, float], FloatArray]:
-    """Return what the engine asks: a rule, whose last answers are kept. It holds no simulation, which holds it."""
-
-    def answer(position: FloatArray, time: float) -> FloatArray:
-        values = np.ascontiguousarray(asked(name, rule, position, time))
-        prescribed[name] = Prescription.of(time, position, values)
-        return values
-
-    return answer
-
-
-def _motion(rule: Rule, centres: FloatArray, prescribed: dict[str, Prescription]) -> Callable[[float], FloatArray]:
-    """Return what the engine asks of a rule for motions."""
-
-    def answer(time: float) -> FloatArray:
-        values = asked("motion", rule, centres, time)
-        assert values is not None
-        prescribed["motion"] = Prescription(time, centres, np.array(values))
-        return poses(rule, centres, time)
-
-    return answer
-
-
-def _is_rigid(body: dict[str, Any]) -> bool:
-    return bool(body["moves"] and body["velocity"] is None)
 
 
 def next_multiple(time: float, interval: float) -> float:

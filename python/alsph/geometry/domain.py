@@ -135,7 +135,7 @@ class SolidBody:
     center : sequence of float, shape (d,)
         Point that its torques are taken about [D].
     velocity : sequence of float, shape (d,), optional
-        Velocity of its particles [U]; at rest if not given. None: the velocities that `Case.particles` gives them, or of
+        Velocity of its particles [U]; at rest if not given. None: the velocities that `Case.particles` gives them; of
         a body that moves those of its motion.
     moves : bool
         Whether its particles go along with that velocity; those of a plate that slides in its own plane need not.
@@ -178,7 +178,9 @@ class SolidBody:
             _keep(self, "velocity", tuple(velocity.tolist()))
         if self.rigid is not None:
             if not isinstance(self.rigid, Rigid):
-                raise ConfigError(f"body '{name}': rigid = {shown(self.rigid)}: must be a Rigid(mass, inertia, displaced)")
+                raise ConfigError(
+                    f"body '{name}': rigid = {shown(self.rigid)}: must be a Rigid(mass, inertia, displaced)"
+                )
             self.rigid.settings(len(center))
             _keep(self, "moves", True)
             _keep(self, "velocity", None)

@@ -142,8 +142,10 @@ class Loads(Fields):
         for name in names:
             for each in parts:
                 moment += self.history.get(f"{name}_{each}_torque", missing)
-            arm = np.subtract(centres.get(name, np.nan), point)
-            moment += arm[0] * self._force("y", part, name) - arm[1] * self._force("x", part, name)
+            x, y = np.subtract(centres.get(name, np.nan), point)
+            turned = self.history.get(f"{name}_angle", 0.0)  # the point goes along with a body that moves
+            x, y = x * np.cos(turned) - y * np.sin(turned), x * np.sin(turned) + y * np.cos(turned)
+            moment += x * self._force("y", part, name) - y * self._force("x", part, name)
         return -2.0 * moment / case.chord**2
 
     def moment(self, about: Sequence[float] | None = None, body: str | None = None) -> Load:
