@@ -5,7 +5,7 @@ use crate::base::parallel::CHUNK;
 use crate::frame::Frame;
 use crate::kernel::{Smoothing, with_kernel};
 use crate::particles::{ParticleKind, Particles};
-use crate::settings::{Boundary, Settings, TimeStepLimits};
+use crate::settings::{Body, Boundary, Settings, TimeStepLimits};
 use rayon::prelude::*;
 
 /// A particle whose neighbours' kernels sum to less than this part of its own is alone.
@@ -143,7 +143,13 @@ pub fn likely_cause<const D: usize>(
             "body \"{}\" has reached a side of the domain: let it move less far, or take a larger domain",
             settings.bodies[particles.body[symptom.particle] as usize].name
         ),
-        "position" => "it has gone through a wall or into a body: take a smaller time step or a finer resolution".into(),
+        "position" => {
+            let told = "it has gone through a wall or into a body: take a smaller time step or a finer resolution";
+            match nearest_body(settings, particles, symptom.particle).filter(|body| body.is_rigid()) {
+                Some(body) => format!("{told}, or keep \"{}\" some spacings away from sides and other bodies", body.name),
+                None => told.into(),
+            }
+        }
         "volume" => "a void has opened around it: take a smaller time step, a finer resolution, or more shifting".into(),
         _ => format!(
             "{}: take a smaller time step, a smaller penalty constant or a finer resolution",
@@ -171,10 +177,17 @@ fn place<const D: usize>(settings: &Settings, particles: &Particles<D>, i: usize
             }
         }
     }
+    match nearest_body(settings, particles, i) {
+        Some(body) => format!("it is near \"{}\"", body.name),
+        None => "it is in the open flow".into(),
+    }
+}
+
+/// The body that a particle is near, if it is near one.
+fn nearest_body<'a, const D: usize>(settings: &'a Settings, particles: &Particles<D>, i: usize) -> Option<&'a Body> {
     let distance = |&j: &usize| (particles.position[j] - particles.position[i]).norm();
     let solid = (0..particles.real).filter(|&j| particles.kind[j] == ParticleKind::Solid && j != i);
-    match solid.min_by(|a, b| distance(a).total_cmp(&distance(b))) {
-        Some(j) if distance(&j) < near => format!("it is near \"{}\"", settings.bodies[particles.body[j] as usize].name),
-        _ => "it is in the open flow".into(),
-    }
+    let nearest = solid.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let near = nearest.filter(|j| distance(j) < 2.0 * settings.support_radius());
+    near.map(|j| &settings.bodies[particles.body[j] as usize])
 }

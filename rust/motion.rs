@@ -131,6 +131,8 @@ pub struct Motion<const D: usize> {
     members: Vec<(usize, usize)>,
     /// Lengths of the domain's periodic directions; zero of others.
     period: Vector<D>,
+    /// Whether free bodies go on from poses that were set.
+    goes_on: bool,
 }
 
 #[derive(Debug)]
@@ -163,7 +165,7 @@ struct Shape<const D: usize> {
 impl<const D: usize> Default for Motion<D> {
     fn default() -> Self {
         let (bodies, place_of, shape, members) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { bodies, place_of, shape, members, period: Vector::zeros() }
+        Self { bodies, place_of, shape, members, period: Vector::zeros(), goes_on: false }
     }
 }
 
@@ -210,6 +212,7 @@ impl<const D: usize> Motion<D> {
 
     /// Go on with free bodies in such `poses`, one for each of the settings' bodies.
     pub fn set_poses(&mut self, poses: &[Pose]) {
+        self.goes_on = true;
         self.bodies.iter_mut().for_each(|body| body.start = poses[body.body as usize]);
     }
 
@@ -245,7 +248,15 @@ impl<const D: usize> Motion<D> {
             body.layer += mass;
             body.layer_inertia += mass * spatial(&shape.arm).cross(&spatial(&shape.normal)).norm_squared();
         }
-        self.bodies.iter_mut().for_each(|body| (body.frame, body.end) = (body.start, body.start));
+        for body in &mut self.bodies {
+            if let Some(rigid) = body.rigid.as_ref().filter(|_| !self.goes_on) {
+                // The fluid at rest answers to the first acceleration with the mass that it takes along.
+                let at_once = [rigid.added_mass, rigid.added_inertia];
+                body.start.respond::<D>(rigid, at_once, &settings.body_force, Vector3::zeros(), Vector3::zeros());
+                body.start.follow(1.0);
+            }
+            (body.frame, body.end) = (body.start, body.start);
+        }
         self.locate(particles);
         self.place(Moment::Start, &mut particles.position, &mut particles.normal);
         self.give_velocity(&mut particles.velocity);

@@ -111,7 +111,7 @@ def test_the_engine_takes_what_the_cases_give(model):
         (lambda: SolidBody("a", (0, 0), []), "body 'a': velocity = []: must be two finite numbers"),
         (lambda: SolidBody("a", (0, 0), (1, float("nan"))), "body 'a': velocity = (1, nan)"),
         (lambda: SolidBody("a", (0, 0), moves=1), "body 'a': moves = 1: must be True or False"),
-        (lambda: SolidBody("a", (0, 0), None, moves=True), "body 'a': moves, and so needs a velocity"),
+        (lambda: SolidBody("a", (0, 0), rigid=3), "body 'a': rigid = 3: must be a Rigid(mass, inertia, displaced)"),
         (lambda: SolidBody("a", (0, 0), belt=(0, 1)), "belt = (0, 1): must be two numbers, the lower one first"),
         (lambda: SolidBody("a", (0, 0), moves=True, belt=(1, 0)), "belt = (1, 0)"),
         (

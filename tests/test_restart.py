@@ -14,7 +14,9 @@ from alsph.config import Config, RunSettings
 from alsph.engine.prescribed import Prescription, backflow, difference, fingerprint
 from alsph.errors import ConfigError, RunFolderError, SolverError
 from alsph.folder.run_folder import RunFolder
+from alsph.geometry.domain import SolidBody
 from alsph.geometry.particles import Kind
+from alsph.geometry.rigid import Rigid
 from alsph.running.beginning import changed, remarks, unlike
 from alsph.running.control import Control
 from alsph.running.start import complete, resume, start
@@ -91,6 +93,23 @@ class Turning(Told):
     surface_velocity: str | None = "-y*cos(10*t), (x - upstream)*cos(10*t)"
 
 
+class Swinging(Told):
+    """A body that moves as it is told, too."""
+
+    name = "swinging"
+    body_motion: str | None = "0.05*sin(20*t), 0.1*t, 0.3*sin(10*t)"
+
+
+class Free(Told):
+    """A body that the fluid moves, on springs."""
+
+    name = "free"
+
+    def bodies(self):
+        rigid = Rigid(0.5, 0.1, displaced=0.785, stiffness=(5, 5))
+        return [SolidBody("cylinder", tuple(self.centre), rigid=rigid)]
+
+
 class Constant(Cylinder):
     """An array, which the particles keep and hand on."""
 
@@ -117,7 +136,7 @@ def assert_inflow(path, case):
     assert state["velocity"][inlet] == pytest.approx(known, abs=1e-8)
 
 
-ALL = Sheared, Constant, Pulsing, Prescribed, Told, Driven, Turning
+ALL = Sheared, Constant, Pulsing, Prescribed, Told, Driven, Turning, Swinging, Free
 
 
 @pytest.fixture(params=[Cylinder, *ALL], ids=lambda model: model.__name__)

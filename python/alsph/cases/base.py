@@ -243,6 +243,9 @@ class Case(Driven):
         """Return what is to be changed in the settings of a body that a rule tells of."""
         if "motion" in self.rules and body.name in self.moved_bodies:
             return {"velocity": None, "moves": True}
+        if body.moves and body.velocity is None and not body.rigid:
+            told = "give it a velocity, make it rigid, or say how it moves by `motion` or `body_motion`"
+            raise ConfigError(f"{self.name}: body '{body.name}' moves, and nothing says how; {told}")
         return {"velocity": None} if "sliding" in self.rules and not body.moves else {}
 
     def build(self, threads: int | None = None) -> Problem:

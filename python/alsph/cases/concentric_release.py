@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
@@ -22,6 +22,9 @@ from alsph.geometry.solids import cylinder_rings
 from alsph.geometry.volume import Volume
 
 RADIUS = 0.5
+
+COURANT = 0.02
+"""Courant number where none is given: pressure that travels as waves is to cross the vessel often in 0.1 √(D/g)."""
 SOURCE = "exact, of a fluid without viscosity: (m - ρA) g / (m + C_a ρA), C_a = (b² + a²)/(b² - a²)"
 
 
@@ -41,6 +44,11 @@ class ConcentricRelease(Case):
     resolution: int = Field(default=20, ge=8, description="particles across the cylinder, D/Δx [-]")
     density_ratio: float = Field(default=2.0, gt=0, description="density of the cylinder over that of the fluid [-]")
     vessel: float = Field(default=2.0, gt=1.3, description="diameter of the vessel [D]")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _first_instants(cls, values: dict[str, Any]) -> dict[str, Any]:
+        return values if values.get("courant") or values.get("time_step") else values | {"courant": COURANT}
 
     @property
     def default_until(self) -> float:

@@ -1,0 +1,243 @@
+"""Bodies that move: as they are told, and as the fluid makes them."""
+
+import re
+
+import alsph
+import numpy as np
+import pytest
+from alsph import cases
+from alsph.cases import ConcentricRelease, Cylinder, OscillatingCylinder, SettlingSphere, TowedCylinder
+from alsph.engine.motion import poses
+from alsph.errors import ConfigError, SolverError
+from alsph.geometry.domain import SolidBody
+from alsph.geometry.particles import Kind
+from alsph.geometry.rigid import Rigid
+from alsph.results.ledger import _wall_power as ledger_power
+from alsph.running.outputs import SurfacePressure
+from alsph.study.declaration import digest
+from scipy.spatial.transform import Rotation
+
+SMALL = {"resolution": 8, "length": 6.0, "height": 4.0, "upstream": 2.0}
+CENTRES = np.array([[1.0, 0.5], [2.0, -0.5]])
+
+
+# What a rule tells
+
+
+def test_velocities_and_accelerations_are_those_of_the_way():
+    def rule(position, time):
+        x, y = position.T
+        return np.stack([np.sin(3 * time) * x, time**2 + 0 * y, 0.5 * time**3 + 1 + 0 * y], axis=1)
+
+    found = poses(rule, CENTRES, 0.7).reshape(2, 8, 3)
+    way, angle, velocity, spin, acceleration, turning = found.transpose(1, 0, 2)[:6]
+    x = CENTRES[:, 0]
+    assert way == pytest.approx(np.stack([np.sin(2.1) * x, [0.49] * 2, [0, 0]], axis=1))
+    assert velocity == pytest.approx(np.stack([3 * np.cos(2.1) * x, [1.4] * 2, [0, 0]], axis=1), abs=1e-9)
+    assert acceleration == pytest.approx(np.stack([-9 * np.sin(2.1) * x, [2.0] * 2, [0, 0]], axis=1), abs=1e-6)
+    assert angle[:, 2] == pytest.approx(0.5 * 0.7**3)  # that of the time 0 is taken off
+    assert spin[:, 2] == pytest.approx(1.5 * 0.7**2) and turning[:, 2] == pytest.approx(3 * 0.7, abs=1e-6)
+    assert not angle[:, :2].any() and not found[:, 6:].any()
+
+
+def test_angles_in_space_are_rotation_vectors_and_turn_about_any_axis():
+    def rotation(time):
+        return Rotation.from_rotvec([0, 0, 2 * time]) * Rotation.from_rotvec([0.5 * np.sin(time), 0, 0])
+
+    found = poses(lambda position, time: [0, 0, 0, *rotation(time).as_rotvec()], np.zeros((1, 3)), 0.4)[0].reshape(8, 3)
+    step = 1e-5
+    turn = (rotation(0.4 + step) * rotation(0.4 - step).inv()).as_rotvec() / (2 * step)
+    assert found[3] == pytest.approx(turn, abs=1e-7)
+    later, before = (
+        (rotation(t + step) * rotation(t - step).inv()).as_rotvec() / (2 * step) for t in (0.4 + 1e-4, 0.4 - 1e-4)
+    )
+    assert found[5] == pytest.approx((later - before) / 2e-4, abs=1e-4)
+    assert Rotation.from_rotvec(found[1]).as_matrix() == pytest.approx(rotation(0.4).as_matrix())
+
+
+def test_a_body_begins_where_it_is_drawn_and_goes_as_the_expression_says():
+    case = Cylinder(**SMALL, body_motion="0.1*cos(4*t), 0.2*t, 2*t")
+    simulation = case.simulation(threads=1)
+    solid = simulation.state()["kind"] == Kind.SOLID
+    assert simulation.state()["position"][solid].mean(axis=0) == pytest.approx([2, 0])
+    simulation.run_until(0.5)
+    time, state, rows = simulation.time, simulation.state(), simulation.history()
+    solid = state["kind"] == Kind.SOLID
+    there = np.array([2 + 0.1 * (np.cos(4 * time) - 1), 0.2 * time])
+    assert state["position"][solid].mean(axis=0) == pytest.approx(there)
+    assert rows["displacement"][-1, 0] == pytest.approx(there - [2, 0])
+    assert rows["velocity"][-1, 0] == pytest.approx([-0.4 * np.sin(4 * time), 0.2])
+    assert rows["angle"][-1, 0, 0] == pytest.approx(2 * time) and rows["angular_velocity"][-1, 0, 0] == pytest.approx(2)
+    x, y = (state["position"][solid] - there).T
+    expected = np.stack([-0.4 * np.sin(4 * time) - 2 * y, 0.2 + 2 * x], axis=1)
+    assert state["velocity"][solid] == pytest.approx(expected)
+    assert state["normal"][solid] == pytest.approx(np.stack([x, y], axis=1) / np.hypot(x, y)[:, None])
+    assert "pose" in state and "pose" not in Cylinder(**SMALL).simulation(threads=1).state()
+
+
+def test_points_of_the_surface_and_moments_go_along_with_the_body(tmp_path):
+    case = Cylinder(**SMALL, body_motion="0.2*t, 0, pi/2*t")
+    simulation = case.simulation(threads=1)
+    simulation.run_until(1.0)
+    rows, points = simulation.history(), case.surface_points()
+    found = SurfacePressure(points, 1.0, case).sample(simulation, rows)["pressure_coefficient"]
+    turn = Rotation.from_euler("z", np.pi / 2 * simulation.time).as_matrix()[:2, :2]
+    there = [2 + 0.2 * simulation.time, 0] + (points.position - [2, 0]) @ turn.T
+    assert np.hypot(*(there - [2 + 0.2 * simulation.time, 0]).T) == pytest.approx(0.5)
+    pressure = simulation.sample(there)["pressure"]
+    assert found == pytest.approx(2 * (pressure - rows["inlet_pressure"][-1]))
+
+    run = case.run(tmp_path / "run", until=1.0, progress=False)
+    drag, own = run.history["drag_coefficient"][-1], run.moment_coefficient(about=(2.0, 0.0))[-1]
+    assert run.moment_coefficient(about=(1.5, 0.0))[-1] - own == pytest.approx(0.5 * drag, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"body_motion": "0.1"}, "body_motion = '0.1': 1 components, and there are 2 directions"),
+        ({"body_motion": "a, 0"}, "body_motion = 'a, 0'"),
+    ],
+)
+def test_motions_that_cannot_be_are_refused(options, told):
+    with pytest.raises(ConfigError, match=re.escape(told)):
+        Cylinder(**SMALL, **options)
+    with pytest.raises(ConfigError, match="body_motion = 't, 0': taylor_green has no body to move"):
+        cases.TaylorGreen(body_motion="t, 0")
+
+
+class Lost(Cylinder):
+    """A body that moves, and nothing says how."""
+
+    name = "lost"
+
+    def bodies(self):
+        return [SolidBody("cylinder", (2, 0), None, moves=True)]
+
+
+def test_a_body_of_which_nothing_says_how_it_moves_is_told_of():
+    with pytest.raises(ConfigError, match=r"lost: body 'cylinder' moves, and nothing says how; give it a velocity"):
+        Lost(**SMALL).simulation()
+    assert Lost(**SMALL, body_motion="0, 0.1*t").simulation(threads=1).advance(1) == 1
+
+
+def test_rules_for_motion_in_python_are_checked():
+    simulation = Cylinder(**SMALL).simulation(threads=1)
+    with pytest.raises(ConfigError, match="motion: no body is moved by it"):
+        simulation.prescribe(motion=lambda position, time: [0, 0])
+    for rule in (lambda position, time: [0.0], lambda position, time: "no", lambda position, time: np.zeros((2, 2))):
+        simulation = Cylinder(**SMALL, body_motion="0, 0").simulation(threads=1)
+        simulation.prescribe(motion=rule)
+        with pytest.raises(ConfigError, match="motion: the function must give 2 or 3 numbers a position"):
+            simulation.advance(1)
+    simulation.prescribe(motion=lambda position, time: [np.nan if time > 0.02 else 0.0, 0])
+    with pytest.raises(ConfigError, match="motion.*not finite"):
+        simulation.advance(100)
+
+
+def test_a_body_that_comes_to_a_side_is_told_of():
+    case = Cylinder(**SMALL, body_motion="0, t")
+    with pytest.raises(SolverError, match='keep "cylinder" some spacings away from sides and other bodies'):
+        case.simulation(threads=2).run_until(2)
+
+
+def test_runs_with_another_motion_are_other_runs():
+    first, again, other = (
+        digest(alsph.config.from_tables({"case": "cylinder", **SMALL, "body_motion": text}))
+        for text in ("0, sin(t)", "0, sin(t)", "0, 1.01*sin(t)")
+    )
+    assert first == again != other
+
+
+# What is free
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"mass": 0}, "rigid: mass = 0: must be a number above 0"),
+        ({"mass": "x"}, "rigid: mass = 'x': must be a number above 0"),
+        ({"inertia": (1, 2)}, "rigid: inertia = "),
+        ({"displaced": -1}, "rigid: displaced = -1: must be a number above 0"),
+        ({"force": (1,)}, "rigid: force = (1,): must be 2 finite numbers"),
+        ({"free": (True,)}, "rigid: free = (True,): must be 2 directions and 1 axes, True or False each"),
+        ({"free": (1, 1, 1)}, "rigid: free = (1, 1, 1): must be"),
+        ({"added_mass": -1.0}, "rigid: added_mass = -1.0: must be a number"),
+    ],
+)
+def test_rigid_bodies_that_cannot_be_are_refused(wrong, told):
+    with pytest.raises(ConfigError, match=re.escape(told)):
+        SolidBody("a", (0, 0), rigid=Rigid(**({"mass": 1, "inertia": 1, "displaced": 1} | wrong)))
+
+
+@pytest.mark.parametrize("ratio", [0.1, 0.5, 2.0, 8.0])
+@pytest.mark.parametrize(("scheme", "resolution"), [("alsph", 20), ("isph", 10)])
+def test_a_cylinder_that_is_let_go_has_the_acceleration_of_added_mass(tmp_path, ratio, scheme, resolution):
+    case = ConcentricRelease(density_ratio=ratio, scheme=scheme, resolution=resolution)
+    run = case.run(tmp_path / "run", until=0.11, progress=False)
+    (acceleration,) = run.measures
+    assert acceleration.passed, acceleration
+
+
+def test_a_free_body_moves_as_the_forces_on_it_say():
+    """Its velocity is the integral of force over mass, and its way that of the velocity."""
+    case = ConcentricRelease(density_ratio=2.0, resolution=10, scheme="isph")
+    simulation = case.simulation(threads=1)
+    simulation.run_until(0.3)
+    rows = simulation.history()
+    mass, step = 2 * np.pi / 4, rows["time_step"]
+    force = (rows["pressure_force"] + rows["viscous_force"])[:, 0, 1] - mass / 2
+    velocity, way = rows["velocity"][:, 0, 1], rows["displacement"][:, 0, 1]
+    assert velocity[-1] == pytest.approx((force[10:] * step[10:]).sum() / mass + velocity[9], rel=0.03)
+    assert way[-1] == pytest.approx((0.5 * (velocity + np.append(0, velocity[:-1])) * step).sum())
+    assert np.abs(rows["displacement"][:, 0, 0]).max() < 1e-6
+
+
+def test_a_restored_free_body_has_the_bits_of_a_whole_one():
+    case = ConcentricRelease(density_ratio=0.5, resolution=8)
+    whole, cut = (case.simulation(threads=1) for _ in range(2))
+    whole.advance(12)
+    cut.advance(5)
+    again = case.restored(cut.state(), threads=2)
+    again.advance(7)
+    first, second = whole.state(), again.state()
+    for name, values in first.items():
+        order = [np.argsort(state["id"]) if name != "pose" and np.ndim(values) else ... for state in (first, second)]
+        assert np.array_equal(np.asarray(values)[order[0]], np.asarray(second[name])[order[1]]), name
+
+
+# Cases
+
+
+def test_towed_and_fixed_feel_the_same(tmp_path):
+    drags = [
+        TowedCylinder(resolution=8, length=8, height=8, frame=frame)
+        .run(tmp_path / frame, until=3, progress=False)
+        .measures[0]
+        .value
+        for frame in ("fluid", "cylinder")
+    ]
+    assert drags[0] == pytest.approx(drags[1], rel=0.03) and drags[0] > 1
+
+
+def test_the_work_of_a_body_that_moves_is_in_the_energy_budget(tmp_path):
+    case = OscillatingCylinder(resolution=12, length=6, height=6, reynolds=50)
+    run = case.run(tmp_path / "run", until=5, progress=False, output_interval=0.5)
+    history, power = run.history, ledger_power(run, case)
+    late = history["time"] > 1  # the start is an impulse
+    given, taken = ((rate * history["time_step"])[late].sum() for rate in (power, history["dissipation"]))
+    kinetic = history["kinetic_energy"][late]
+    assert given > 1 and given == pytest.approx(taken + kinetic[-1] - kinetic[0], rel=0.03)
+    at = np.interp(run.times[1:], history["time"], power)
+    assert run.ledger.power[1:] == pytest.approx(at)
+    names = [measure.name for measure in run.measures]
+    assert "inertia coefficient of Morison" in names and len(run.profiles) == 1
+
+
+def test_a_quarter_of_a_sphere_settles_straight(tmp_path):
+    case = SettlingSphere(resolution=8, height=6, width=3)
+    run = case.run(tmp_path / "run", until=0.5, progress=False)
+    history = run.history
+    assert not history["sphere_displacement_x"].any() and not history["sphere_angle_x"].any()
+    assert -0.2 < history["sphere_velocity_z"][-1] < -0.1
+    assert (np.diff(history["sphere_velocity_z"]) <= 0).all()
