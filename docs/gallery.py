@@ -17,6 +17,7 @@ FIELDS = {
     "body_3d": "velocity",
     "backward_facing_step": "velocity",
     "cavity": "velocity",
+    "concentric_release": "velocity",
     "dam_break": "pressure",
     "elliptical_drop": "pressure",
     "nozzle": "velocity",

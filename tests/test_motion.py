@@ -1,6 +1,7 @@
 """Bodies that move: as they are told, and as the fluid makes them."""
 
 import re
+from pathlib import Path
 
 import alsph
 import numpy as np
@@ -241,3 +242,17 @@ def test_a_quarter_of_a_sphere_settles_straight(tmp_path):
     assert not history["sphere_displacement_x"].any() and not history["sphere_angle_x"].any()
     assert -0.2 < history["sphere_velocity_z"][-1] < -0.1
     assert (np.diff(history["sphere_velocity_z"]) <= 0).all()
+
+
+def test_the_examples_of_the_page_are_run():
+    page = (Path(__file__).parents[1] / "docs" / "moving_bodies.md").read_text(encoding="utf-8")
+    table, vibrating = re.findall(r"^```python\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
+    space = {"__name__": "examples"}
+    exec(table + vibrating, space)
+    shaken = space["Shaken"](**SMALL).simulation(threads=1)
+    shaken.run_until(0.2)
+    assert shaken.history()["displacement"][-1, 0] == pytest.approx([0, 0.2 * np.sin(shaken.time)], abs=1e-3)
+    vibrating = space["VibratingCylinder"](**SMALL, reynolds=150).simulation(threads=1)
+    vibrating.run_until(1.0)
+    way = vibrating.history()["displacement"][:, 0]
+    assert not way[:, 0].any() and 0 < np.abs(way[:, 1]).max() < 0.1

@@ -19,6 +19,7 @@ from . import (
 )
 from .engine.simulation import Simulation
 from .geometry.domain import Domain, SolidBody
+from .geometry.rigid import Rigid
 from .results.run import Run, open_run
 from .running.repetition import repeat
 from .running.start import resume
@@ -35,6 +36,7 @@ __version__: str
 __all__ = [
     "Comparison",
     "Domain",
+    "Rigid",
     "Run",
     "SchemeComparison",
     "Simulation",

@@ -48,7 +48,8 @@ class ConcentricRelease(Case):
     @model_validator(mode="before")
     @classmethod
     def _first_instants(cls, values: dict[str, Any]) -> dict[str, Any]:
-        return values if values.get("courant") or values.get("time_step") else values | {"courant": COURANT}
+        given = any(values.get(name) is not None for name in ("courant", "time_step", "penalty_constant"))
+        return values if given else values | {"courant": COURANT}
 
     @property
     def default_until(self) -> float:
@@ -61,8 +62,8 @@ class ConcentricRelease(Case):
         return ["cylinder"]
 
     def domain(self) -> Domain:
-        """Return the square around the vessel, which closes it."""
-        radius = self.vessel / 2
+        """Return a square around the vessel, which closes it."""
+        radius = self.vessel / 2 + 0.1
         return Domain((-radius, -radius), (radius, radius), [("none", "none")] * 2)
 
     def bodies(self) -> list[SolidBody]:

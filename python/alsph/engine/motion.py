@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from alsph.arrays import FloatArray
 from alsph.engine.prescribed import Prescription, Rule, asked
@@ -38,15 +37,23 @@ def poses(rule: Rule, centres: FloatArray, time: float) -> FloatArray:
     """
     start = _placed(rule, centres, 0.0)
     way, turn = zip(*(_placed(rule, centres, time + k * INTERVAL) for k in range(-2, 3)), strict=True)
-    back = Rotation.from_rotvec(start[1]).inv()
-    now = Rotation.from_rotvec(turn[2])
-    if centres.shape[1] == 2:  # about one axis angles add up, and go on beyond a turn
-        angle, away = turn[2] - start[1], [each - turn[2] for each in turn]
-    else:
-        angle = (now * back).as_rotvec()
-        away = [(Rotation.from_rotvec(each) * now.inv()).as_rotvec() for each in turn]
+    angle, away = _about_one_axis(start[1], turn) if centres.shape[1] == 2 else _in_space(start[1], turn)
     rates = [np.tensordot(weights, np.stack(of), 1) for weights in (FIRST, SECOND) for of in (way, away)]
     return np.hstack([way[2] - start[0], angle, *rates, np.zeros((len(centres), 6))])
+
+
+def _about_one_axis(start: FloatArray, turn: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
+    """Return the rotation vector since the start, and those at other times from the middle one on."""
+    return turn[2] - start, [each - turn[2] for each in turn]  # angles add up, and go on beyond a turn
+
+
+def _in_space(start: FloatArray, turn: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
+    """Return the same where axes may be any."""
+    from scipy.spatial.transform import Rotation  # takes its time
+
+    now = Rotation.from_rotvec(turn[2])
+    away = [(Rotation.from_rotvec(each) * now.inv()).as_rotvec() for each in turn]
+    return (now * Rotation.from_rotvec(start).inv()).as_rotvec(), away
 
 
 def answering_poses(

@@ -94,6 +94,7 @@ QUICK = (
     Entry("dam_break", (20, 40), until=2.0),
     Entry("standing_wave", (20, 30), until=10.0),
     Entry("elliptical_drop", (10, 20), until=0.8),
+    Entry("concentric_release", (10, 20), until=0.11, parameters={"density_ratio": 0.5}),
 )
 FULL = (
     Entry("taylor_green", (25, 50, 100), until=1.0),
@@ -105,6 +106,9 @@ FULL = (
     Entry("nozzle", (10, 20), until=20.0),
     Entry("bend", (10, 20), until=20.0),
     Entry("taylor_couette", (10, 20, 40), until=1.0),
+    Entry("concentric_release", (10, 20, 40), until=0.11, parameters={"density_ratio": 0.1}),
+    Entry("concentric_release", (10, 20, 40), until=0.11, parameters={"density_ratio": 2.0}),
+    Entry("oscillating_cylinder", (10, 20), until=15.0),
     Entry("dam_break", (20, 40, 80), until=2.0),
     Entry("still_water", (20, 40), until=10.0),
     Entry("standing_wave", (20, 40), until=10.0, parameters={"reynolds": 50}),
