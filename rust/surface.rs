@@ -102,6 +102,11 @@ impl<const D: usize> Surface<D> {
         self.found[i].normal()
     }
 
+    /// Whether a particle, real or an image, is at the surface.
+    pub fn is_at_surface(&self, i: usize) -> bool {
+        self.strength[i][1] > 0.0
+    }
+
     /// Σ |slope| that the neighbours of particle `i` lack of the lattice's: the air has their place.
     pub fn missing(&self, i: usize) -> f64 {
         self.found[i].missing
@@ -124,11 +129,13 @@ impl<const D: usize> Surface<D> {
             Surroundings,
             &mut self.found,
             frame.images.real(&mut self.strength),
-            |_, (alpha, first, [slopes, lengths]), found, strength| {
+            |i, (alpha, first, [slopes, lengths]), found, strength| {
                 let (values, vectors) = symmetric_eigen(&alpha);
                 let (least, inverse) = (values.min(), inverse_with_floor(&values, &vectors));
                 *found = Found { trace: alpha.trace() / D as f64, least, missing: (sum - slopes).max(0.0), inverse, first };
-                *strength = [lengths / least.max(FLOOR) / reach, 0.0];
+                // Solids have no equations, and are as dense as they were placed.
+                let is_fluid = particles.kind[i] == ParticleKind::Fluid;
+                *strength = [if is_fluid { lengths / least.max(FLOOR) / reach } else { 0.0 }, 0.0];
             },
         );
         let found = &self.found;

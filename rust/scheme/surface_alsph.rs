@@ -9,17 +9,21 @@
 //! ```
 //!
 //! G* is minus the adjoint of the divergence, w a weight that is 1 inside, P a gradient that is antisymmetric in pairs. In ∇²p next to
-//! the surface the neighbours that are missing are air, at p = 0. There are no solids: settings with bodies are refused.
+//! the surface the neighbours that are missing are air, at p = 0.
+//!
+//! Solids show the velocity of the wall to the divergence, its mirror image to the viscous term, and to gradients what the fluid around has:
+//! of w q its mean, of p its mean continued with the hydrostatic slope, as images beyond slip walls do.
 
-use crate::base::{Tensor, Vector, parallel};
-use crate::boundary::{VelocityRule, conditions};
+use crate::base::{Matrix, Tensor, Vector, parallel};
+use crate::boundary::{VelocityRule, conditions, extrapolate_scalar, shepard};
 use crate::discretisation::{AdjointGradient, ConservativeGradient, Divergence, LaplacianAndGradient, LaplacianAndItsSum};
 use crate::flow::{Flow, Step};
-use crate::particles::Particles;
+use crate::particles::{ParticleKind, Particles};
 use crate::scheme::projection::{EIGENVALUE_MARGIN, weight};
 use crate::scheme::{Derived, Scheme, Solved};
 use crate::settings::{Eigenvalues, FreeSurface, PressureGradient, Settings, TimeStepLimits};
 use crate::surface::{Place, Surface};
+use rayon::prelude::*;
 
 #[derive(Debug)]
 pub struct SurfaceAlsph<const D: usize> {
@@ -37,6 +41,8 @@ pub struct SurfaceAlsph<const D: usize> {
     divergence: Vec<f64>,
     /// What G* is taken of.
     tensor: Vec<Tensor<D>>,
+    /// w q, if there are solids.
+    pushed: Vec<f64>,
     velocity_star: Vec<Vector<D>>,
     pressure_laplacian: Vec<f64>,
 }
@@ -53,6 +59,7 @@ impl<const D: usize> SurfaceAlsph<D> {
             surface_pressure: Vec::new(),
             divergence: Vec::new(),
             tensor: Vec::new(),
+            pushed: Vec::new(),
             velocity_star: Vec::new(),
             pressure_laplacian: Vec::new(),
         }
@@ -60,7 +67,9 @@ impl<const D: usize> SurfaceAlsph<D> {
 
     /// What ∇·u^{n+1} is to be in the frame, and ∇²u^n.
     fn begin(&mut self, step: Step, flow: &mut Flow<D>) {
-        let Flow { particles, frame, surface, .. } = flow;
+        let Flow { particles, frame, surface, walls, .. } = flow;
+        walls.see(step.settings, particles, frame);
+        let walls = &*walls;
         frame.images.blank(&mut self.derived, particles.real);
         frame.images.blank(&mut self.divergence, particles.len());
         frame.images.blank(&mut self.strain_rate, particles.real);
@@ -68,7 +77,7 @@ impl<const D: usize> SurfaceAlsph<D> {
         let (relaxation, undisturbed) = (self.own.packing_relaxation / step.time_step, self.undisturbed);
         let velocity = &particles.velocity;
         frame.stencil.for_each(
-            LaplacianAndGradient { velocity, seen: |s: usize, _: usize| velocity[s] },
+            LaplacianAndGradient { velocity, seen: |s, i| walls.seen_by(particles, s, i) },
             &mut self.derived,
             &mut self.strain_rate,
             |i, (laplacian, gradient), derived, strain_rate| {
@@ -112,7 +121,9 @@ impl<const D: usize> SurfaceAlsph<D> {
             AdjointGradient { tensor: &self.tensor, own: |_| 1.0 },
             &mut self.derived,
             |i, value, derived| {
-                if surface.place[i].sees_air() {
+                // What a wall does to the stress solids do not tell.
+                let is_free = frame.stencil.neighbours.row(i).0.solid().is_empty();
+                if surface.place[i].sees_air() && is_free {
                     derived.laplacian = value;
                 }
             },
@@ -120,26 +131,56 @@ impl<const D: usize> SurfaceAlsph<D> {
     }
 
     /// w q B of all particles, from the divergence of the fluid.
-    fn form_tensor(&mut self, Flow { particles, frame, surface, .. }: &Flow<D>) {
-        frame.images.blank(&mut self.tensor, particles.len());
+    fn form_tensor(&mut self, settings: &Settings, Flow { particles, frame, surface, .. }: &Flow<D>) {
+        let kind = &particles.kind[..particles.real];
         let (divergence, weight) = (&self.divergence, &surface.weight);
+        let pushed = &mut self.pushed;
+        if !settings.bodies.is_empty() {
+            frame.images.blank(pushed, particles.len());
+            parallel::for_each(frame.images.real(pushed), |i, pushed| *pushed = weight[i] * divergence[i]);
+            extrapolate_scalar(settings, frame, kind, pushed);
+        }
+        frame.images.blank(&mut self.tensor, particles.len());
         parallel::for_each(frame.images.real(&mut self.tensor), |i, tensor| {
-            tensor.0 = frame.stencil.correction[i].inverse * (weight[i] * divergence[i]);
+            tensor.0 = match kind[i] {
+                ParticleKind::Solid => Matrix::identity() * pushed[i],
+                _ => frame.stencil.correction[i].inverse * (weight[i] * divergence[i]),
+            };
         });
         frame.images.fill(&mut self.tensor);
     }
 
-    /// The pressure that images show.
-    fn extend_pressure(step: Step, Flow { particles, frame, body_force, surface, .. }: &mut Flow<D>) {
-        let (place, density) = (&surface.place, step.settings.density);
-        frame.images.fill_pressure(&mut particles.pressure, &particles.position, |i| match place[i] {
-            Place::Inside | Place::Near => body_force.at(i) * density,
-            Place::AtSurface | Place::Isolated => Vector::zeros(),
-        });
+    /// The pressure that images and solids show.
+    fn extend_pressure(&self, step: Step, Flow { particles, frame, body_force, surface, .. }: &mut Flow<D>) {
+        let (place, settings) = (&surface.place, step.settings);
+        let fill = |particles: &mut Particles<D>| {
+            frame.images.fill_pressure(&mut particles.pressure, &particles.position, |i| match place[i] {
+                Place::Inside | Place::Near => body_force.at(i) * settings.density,
+                Place::AtSurface | Place::Isolated => Vector::zeros(),
+            });
+        };
+        fill(particles);
+        if settings.bodies.is_empty() {
+            return;
+        }
+        let pressure = &particles.pressure;
+        let shown = |s: usize| {
+            let mean = shepard(settings, &frame.stencil, s, |j, r_sj| {
+                let force = if surface.is_at_surface(j) { Vector::zeros() } else { body_force.at(j) };
+                [pressure[j] + ((force - body_force.acceleration_of_wall(s)) * settings.density).dot(&r_sj)]
+            });
+            let [p] = mean.unwrap_or([0.0]);
+            (s, if self.own.tension { p } else { p.max(0.0) })
+        };
+        let solids = (0..particles.real).into_par_iter().filter(|&i| particles.kind[i] == ParticleKind::Solid);
+        let shown: Vec<_> = solids.map(shown).collect();
+        let real = frame.images.real(&mut particles.pressure);
+        shown.into_iter().for_each(|(s, p)| real[s] = p);
+        fill(particles);
     }
 
     fn predict_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
-        self.form_tensor(flow);
+        self.form_tensor(step.settings, flow);
         let Flow { particles, frame, before, .. } = flow;
         let condition = conditions(step.settings);
         let (dt, viscosity, penalty) = (step.time_step, step.settings.kinematic_viscosity, self.penalty);
@@ -149,10 +190,12 @@ impl<const D: usize> SurfaceAlsph<D> {
             AdjointGradient { tensor: &self.tensor, own: |_| 1.0 },
             frame.images.real(&mut self.velocity_star),
             |i, gradient, star| {
-                *star = before.velocity[i];
-                if condition(particles.kind[i], &particles.position[i]).velocity == VelocityRule::Solved {
-                    *star += (gradient * penalty + derived[i].laplacian * viscosity) * dt;
-                }
+                *star = match condition(particles.kind[i], &particles.position[i]).velocity {
+                    VelocityRule::Kept => particles.velocity[i],
+                    VelocityRule::Solved => {
+                        before.velocity[i] + (gradient * penalty + derived[i].laplacian * viscosity) * dt
+                    }
+                };
             },
         );
         frame.images.fill(&mut self.velocity_star);
@@ -171,10 +214,13 @@ impl<const D: usize> SurfaceAlsph<D> {
                 *out = if place[i].sees_air() { sum - 2.0 * surface.missing(i) * (pressure[i] - air[i]) } else { laplacian };
             },
         );
-        let pressure = &mut particles.pressure;
+        let Particles { kind, pressure, .. } = particles;
         let (density, dt, penalty) = (step.settings.density, step.time_step, self.penalty);
         let (laplacian, derived, tension) = (&self.pressure_laplacian, &self.derived, self.own.tension);
         frame.stencil.for_each_one(Divergence(&self.velocity_star), frame.images.real(pressure), |i, divergence, p| {
+            if kind[i] == ParticleKind::Solid {
+                return;
+            }
             if place[i] == Place::Isolated {
                 *p = 0.0;
                 return;
@@ -184,7 +230,7 @@ impl<const D: usize> SurfaceAlsph<D> {
                 *p = p.max(0.0);
             }
         });
-        Self::extend_pressure(step, flow);
+        self.extend_pressure(step, flow);
     }
 
     fn correct_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
@@ -192,7 +238,10 @@ impl<const D: usize> SurfaceAlsph<D> {
         if self.own.pressure_gradient == PressureGradient::Adjoint {
             frame.images.blank(&mut self.tensor, particles.len());
             parallel::for_each(frame.images.real(&mut self.tensor), |i, tensor| {
-                tensor.0 = frame.stencil.correction[i].inverse;
+                tensor.0 = match particles.kind[i] {
+                    ParticleKind::Solid => Matrix::identity(),
+                    _ => frame.stencil.correction[i].inverse,
+                };
             });
             frame.images.fill(&mut self.tensor);
             // The pressure of an image is its own, beyond a wall across gravity.
@@ -239,7 +288,7 @@ impl<const D: usize> SurfaceAlsph<D> {
             let relaxation = relaxation / weight(step.settings, sweep);
             let factor = step.settings.density * relaxation / step.time_step;
             self.measure_divergence(flow);
-            self.form_tensor(flow);
+            self.form_tensor(step.settings, flow);
             let Flow { particles, frame, surface, .. } = &mut *flow;
             let condition = conditions(step.settings);
             let Particles { kind, position, pressure, velocity, .. } = particles;
@@ -261,7 +310,7 @@ impl<const D: usize> SurfaceAlsph<D> {
             );
             frame.images.fill(velocity);
         }
-        Self::extend_pressure(step, flow);
+        self.extend_pressure(step, flow);
     }
 }
 
@@ -274,7 +323,8 @@ impl<const D: usize> Scheme<D> for SurfaceAlsph<D> {
         self.penalty = step.settings.penalty(step.velocity_max, step.time_step, self.largest.laplacian);
         self.begin(step, flow);
         self.free_of_stress(step, flow);
-        Self::extend_pressure(step, flow);
+        flow.move_solids();
+        self.extend_pressure(step, flow);
         for iteration in 1..=step.settings.max_iterations {
             if iteration > 1 {
                 self.measure_divergence(flow);
@@ -285,6 +335,9 @@ impl<const D: usize> Scheme<D> for SurfaceAlsph<D> {
         }
         self.sweep(step, flow);
         self.measure_divergence(flow);
+        if !step.settings.bodies.is_empty() {
+            flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
+        }
         Solved::after(step.settings.max_iterations)
     }
 

@@ -201,7 +201,7 @@ impl Settings {
             ("viscous_order", self.viscous_order == 2, "2"),
             ("velocity_laplacian", self.velocity_laplacian == VelocityLaplacian::Scalar, "scalar"),
             ("wall_pressure", self.wall_pressure != WallPressure::Paper, "linear or adami"),
-            ("bodies", self.bodies.is_empty(), "none"),
+            ("wall_velocity", self.bodies.is_empty() || self.wall_velocity != WallVelocity::Cubic, "adami, morris or paper"),
             ("domain.boundaries", !has([Boundary::Inlet, Boundary::Outlet]), "without inlets and outlets"),
         ] {
             if !fits {

@@ -22,7 +22,7 @@ from alsph.geometry.particles import Kind, particles
 COURANT = 0.2
 """Courant number of a step where none is given: the shortest waves of the surface are those of gravity."""
 
-SIDES = ("slip", "periodic", "air")
+SIDES = ("slip", "periodic", "air", "none")
 """What closes the sides of a domain in which there is a free surface."""
 
 ENERGY = "largest rise of the energy over its start"
@@ -116,6 +116,9 @@ class FreeSurface(Case):
     )
     shifting: Literal["none"] = Field(default="none", description="none: it would feed thin jets with energy")
     viscous_order: Literal[2] = Field(default=2, description="order of the viscous term in Δx")
+    wall_velocity: Literal["adami", "morris", "paper"] = Field(
+        default="adami", description="velocity that solid particles show to the viscous term"
+    )
     sweep_weights: Literal["chebyshev", "equal"] | None = Field(
         default="equal", description="how far each projection sweep goes"
     )
