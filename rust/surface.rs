@@ -4,11 +4,13 @@
 //! half. Both tell where the fluid ends (Lee et al. 2008, Marrone et al. 2010), and λ how far a gradient there can be trusted.
 
 use crate::base::{Matrix, Tensor, Vector, parallel, symmetric_eigen};
+use crate::boundary::shepard;
 use crate::discretisation::{Correction, Largest, Surroundings};
 use crate::frame::Frame;
 use crate::halo::Poison;
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
+use rayon::prelude::*;
 
 /// Of tr α over D: below it a particle is at the surface if nothing lies before it.
 const CANDIDATE: f64 = 0.875;
@@ -115,6 +117,7 @@ impl<const D: usize> Surface<D> {
     /// Find it in a frame, whose corrections it makes those of a cut support.
     pub fn find(&mut self, settings: &Settings, particles: &Particles<D>, frame: &mut Frame<D>) {
         self.look_around(settings, particles, frame);
+        correct_solids(settings, particles, frame);
         self.place_particles(settings, particles, frame);
         self.weigh();
     }
@@ -195,6 +198,25 @@ impl<const D: usize> Surface<D> {
             *weight = if place[i] == Place::Isolated { 0.0 } else { most };
         });
     }
+}
+
+/// Solids show the mean correction of the fluid around, as images do that of their source.
+fn correct_solids<const D: usize>(settings: &Settings, particles: &Particles<D>, frame: &mut Frame<D>) {
+    if settings.bodies.is_empty() {
+        return;
+    }
+    let mut tensor = Vec::new();
+    frame.images.blank(&mut tensor, particles.len());
+    parallel::for_each(frame.images.real(&mut tensor), |i, tensor| *tensor = Tensor(frame.stencil.correction[i].inverse));
+    frame.images.fill(&mut tensor);
+    let mean = |s: usize| {
+        let entries = |j: usize| std::array::from_fn(|k| tensor[j].0.as_slice().get(k).copied().unwrap_or_default());
+        let mean: Option<[f64; 9]> = shepard(settings, &frame.stencil, s, |j, _| entries(j));
+        mean.map_or_else(Matrix::identity, |mean| Matrix::from_column_slice(&mean[..D * D]))
+    };
+    let solids = (0..particles.real).into_par_iter().filter(|&i| particles.kind[i] == ParticleKind::Solid);
+    let means: Vec<_> = solids.map(|s| (s, mean(s))).collect();
+    means.into_iter().for_each(|(s, mean)| frame.stencil.correction[s].inverse = mean);
 }
 
 impl<const D: usize> Found<D> {

@@ -11,19 +11,24 @@
 //! G* is minus the adjoint of the divergence, w a weight that is 1 inside, P a gradient that is antisymmetric in pairs. In ∇²p next to
 //! the surface the neighbours that are missing are air, at p = 0.
 //!
-//! Solids show the velocity of the wall to the divergence, its mirror image to the viscous term, and to gradients what the fluid around has:
-//! of w q its mean, of p its mean continued with the hydrostatic slope, as images beyond slip walls do.
+//! Solids show what images beyond a slip wall do: to the divergence the mean velocity of the fluid around, the other way across the wall, and to
+//! gradients of w q its mean, of p its mean continued with the hydrostatic slope. The viscous term sees the wall's velocity by its rule.
 
-use crate::base::{Matrix, Tensor, Vector, parallel};
+use crate::base::{Tensor, Vector, parallel};
 use crate::boundary::{VelocityRule, conditions, extrapolate_scalar, shepard};
 use crate::discretisation::{AdjointGradient, ConservativeGradient, Divergence, LaplacianAndGradient, LaplacianAndItsSum};
 use crate::flow::{Flow, Step};
+use crate::frame::Frame;
 use crate::particles::{ParticleKind, Particles};
 use crate::scheme::projection::{EIGENVALUE_MARGIN, weight};
 use crate::scheme::{Derived, Scheme, Solved};
 use crate::settings::{Eigenvalues, FreeSurface, PressureGradient, Settings, TimeStepLimits};
 use crate::surface::{Place, Surface};
 use rayon::prelude::*;
+
+/// Height over a surface [Δx] from which on a particle comes no nearer, and its distance to a solid that tells of the surface.
+const CLOSE: f64 = 0.25;
+const BESIDE: f64 = 1.2;
 
 #[derive(Debug)]
 pub struct SurfaceAlsph<const D: usize> {
@@ -41,8 +46,9 @@ pub struct SurfaceAlsph<const D: usize> {
     divergence: Vec<f64>,
     /// What G* is taken of.
     tensor: Vec<Tensor<D>>,
-    /// w q, if there are solids.
+    /// w q, and u as the divergence sees it, if there are solids.
     pushed: Vec<f64>,
+    mirrored: Vec<Vector<D>>,
     velocity_star: Vec<Vector<D>>,
     pressure_laplacian: Vec<f64>,
 }
@@ -60,6 +66,7 @@ impl<const D: usize> SurfaceAlsph<D> {
             divergence: Vec::new(),
             tensor: Vec::new(),
             pushed: Vec::new(),
+            mirrored: Vec::new(),
             velocity_star: Vec::new(),
             pressure_laplacian: Vec::new(),
         }
@@ -142,10 +149,8 @@ impl<const D: usize> SurfaceAlsph<D> {
         }
         frame.images.blank(&mut self.tensor, particles.len());
         parallel::for_each(frame.images.real(&mut self.tensor), |i, tensor| {
-            tensor.0 = match kind[i] {
-                ParticleKind::Solid => Matrix::identity() * pushed[i],
-                _ => frame.stencil.correction[i].inverse * (weight[i] * divergence[i]),
-            };
+            let pushed = if kind[i] == ParticleKind::Solid { pushed[i] } else { weight[i] * divergence[i] };
+            tensor.0 = frame.stencil.correction[i].inverse * pushed;
         });
         frame.images.fill(&mut self.tensor);
     }
@@ -199,6 +204,7 @@ impl<const D: usize> SurfaceAlsph<D> {
             },
         );
         frame.images.fill(&mut self.velocity_star);
+        mirror(step.settings, frame, particles, &mut self.velocity_star);
     }
 
     fn update_pressure(&mut self, step: Step, flow: &mut Flow<D>) {
@@ -238,10 +244,7 @@ impl<const D: usize> SurfaceAlsph<D> {
         if self.own.pressure_gradient == PressureGradient::Adjoint {
             frame.images.blank(&mut self.tensor, particles.len());
             parallel::for_each(frame.images.real(&mut self.tensor), |i, tensor| {
-                tensor.0 = match particles.kind[i] {
-                    ParticleKind::Solid => Matrix::identity(),
-                    _ => frame.stencil.correction[i].inverse,
-                };
+                tensor.0 = frame.stencil.correction[i].inverse;
             });
             frame.images.fill(&mut self.tensor);
             // The pressure of an image is its own, beyond a wall across gravity.
@@ -272,13 +275,17 @@ impl<const D: usize> SurfaceAlsph<D> {
         frame.images.fill(velocity);
     }
 
-    fn measure_divergence(&mut self, Flow { particles, frame, .. }: &Flow<D>) {
+    fn measure_divergence(&mut self, step: Step, Flow { particles, frame, .. }: &Flow<D>) {
         let derived = &self.derived;
-        frame.stencil.for_each_one(
-            Divergence(&particles.velocity),
-            frame.images.real(&mut self.divergence),
-            |i, value, out| *out = value - derived[i].solenoidal,
-        );
+        let mut velocity = &particles.velocity;
+        if !step.settings.bodies.is_empty() {
+            self.mirrored.clone_from(velocity);
+            mirror(step.settings, frame, particles, &mut self.mirrored);
+            velocity = &self.mirrored;
+        }
+        frame.stencil.for_each_one(Divergence(velocity), frame.images.real(&mut self.divergence), |i, value, out| {
+            *out = value - derived[i].solenoidal
+        });
     }
 
     fn sweep(&mut self, step: Step, flow: &mut Flow<D>) {
@@ -287,7 +294,7 @@ impl<const D: usize> SurfaceAlsph<D> {
         for sweep in 0..step.settings.projection_sweeps {
             let relaxation = relaxation / weight(step.settings, sweep);
             let factor = step.settings.density * relaxation / step.time_step;
-            self.measure_divergence(flow);
+            self.measure_divergence(step, flow);
             self.form_tensor(step.settings, flow);
             let Flow { particles, frame, surface, .. } = &mut *flow;
             let condition = conditions(step.settings);
@@ -314,6 +321,49 @@ impl<const D: usize> SurfaceAlsph<D> {
     }
 }
 
+/// Take what is next to a surface no nearer. A pressure that is not below that of the air holds little back where the fluid is thin.
+fn keep_out<const D: usize>(settings: &Settings, Flow { particles, frame, .. }: &mut Flow<D>) {
+    if settings.bodies.is_empty() {
+        return;
+    }
+    let Particles { kind, normal, depth, velocity, .. } = particles;
+    let (stencil, spacing) = (&frame.stencil, settings.particle_spacing);
+    let walls = velocity.clone();
+    parallel::for_each(frame.images.real(velocity), |i, u| {
+        if kind[i] != ParticleKind::Fluid {
+            return;
+        }
+        let (row, lane) = stencil.neighbours.row(i);
+        for s in row.solid_seen(lane).map(|(entry, _)| entry.j()) {
+            let way = stencil.position[i] - stencil.position[s];
+            if way.norm_squared() < (BESIDE * spacing).powi(2) && way.dot(&normal[s]) - depth[s] < CLOSE * spacing {
+                let approach = (*u - walls[s]).dot(&normal[s]);
+                *u -= normal[s] * approach.min(0.0);
+            }
+        }
+    });
+    frame.images.fill(velocity);
+}
+
+/// Let solids show what is beyond a slip wall in a mirror: the mean of the fluid around, with the other velocity across the wall.
+fn mirror<const D: usize>(settings: &Settings, frame: &Frame<D>, particles: &Particles<D>, velocity: &mut [Vector<D>]) {
+    if settings.bodies.is_empty() {
+        return;
+    }
+    let Particles { real, kind, normal, .. } = particles;
+    let seen = &*velocity;
+    let shown = |s: usize| {
+        let own = particles.velocity[s];
+        let mean = shepard(settings, &frame.stencil, s, |j, _| seen[j].into()).map_or(own, Vector::from);
+        (s, mean - normal[s] * (2.0 * (mean - own).dot(&normal[s])))
+    };
+    let solids = (0..*real).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
+    let shown: Vec<_> = solids.map(shown).collect();
+    let real = frame.images.real(velocity);
+    shown.into_iter().for_each(|(s, u)| real[s] = u);
+    frame.images.fill(velocity);
+}
+
 impl<const D: usize> Scheme<D> for SurfaceAlsph<D> {
     fn limits(&self, settings: &Settings, velocity_max: f64) -> TimeStepLimits {
         settings.time_step_limits(velocity_max, self.largest)
@@ -327,14 +377,15 @@ impl<const D: usize> Scheme<D> for SurfaceAlsph<D> {
         self.extend_pressure(step, flow);
         for iteration in 1..=step.settings.max_iterations {
             if iteration > 1 {
-                self.measure_divergence(flow);
+                self.measure_divergence(step, flow);
             }
             self.predict_velocity(step, flow); // (8)
             self.update_pressure(step, flow); // (10)
             self.correct_velocity(step, flow); // (11)
         }
         self.sweep(step, flow);
-        self.measure_divergence(flow);
+        keep_out(step.settings, flow);
+        self.measure_divergence(step, flow);
         if !step.settings.bodies.is_empty() {
             flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
         }
