@@ -4,10 +4,11 @@
 //! half. Both tell where the fluid ends (Lee et al. 2008, Marrone et al. 2010), and λ how far a gradient there can be trusted.
 
 use crate::base::{Matrix, Tensor, Vector, parallel, symmetric_eigen};
-use crate::boundary::shepard;
+use crate::boundary::{for_each_weighted, shepard};
 use crate::discretisation::{Correction, Largest, Surroundings};
 use crate::frame::Frame;
 use crate::halo::Poison;
+use crate::kernel::{Smoothing, with_kernel};
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 use rayon::prelude::*;
@@ -35,6 +36,16 @@ const FLOOR: f64 = 0.5;
 const CONE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 const CONE_LENGTH: f64 = 2.0;
 
+/// Share of the space in front of a solid up to which it is dry, and from which on it is wet.
+const DRY: f64 = 0.2;
+const WET: f64 = 0.6;
+
+/// Height over a surface [Δx] from which on something is in front of it; rounding would decide of zero.
+const IN_FRONT: f64 = 1e-3;
+
+/// At how many depths, up to the support's radius, it is known what there can be in front.
+const FRONTS: usize = 65;
+
 /// Where a particle is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Place {
@@ -61,6 +72,8 @@ pub struct Surface<const D: usize> {
     pub place: Vec<Place>,
     /// How much of ∇·u a particle may push with, of the real particles: λ², and less where neighbours are so close that they would push too hard.
     pub weight: Vec<f64>,
+    /// Σ W over all that can be in front of a solid, by its depth; empty without solids.
+    front: Vec<f64>,
     found: Vec<Found<D>>,
     /// Of real particles and images: how hard neighbours push a particle over the lattice's, and 1 at the surface.
     strength: Vec<[f64; 2]>,
@@ -116,10 +129,40 @@ impl<const D: usize> Surface<D> {
 
     /// Find it in a frame, whose corrections it makes those of a cut support.
     pub fn find(&mut self, settings: &Settings, particles: &Particles<D>, frame: &mut Frame<D>) {
+        self.wet(settings, particles, frame);
         self.look_around(settings, particles, frame);
         correct_solids(settings, particles, frame);
         self.place_particles(settings, particles, frame);
         self.weigh();
+    }
+
+    /// Give solids the volume of what is in front of them: nothing where that is air. What lies behind another wall there counts, too.
+    fn wet(&mut self, settings: &Settings, particles: &Particles<D>, frame: &mut Frame<D>) {
+        if settings.bodies.is_empty() {
+            return;
+        }
+        if self.front.is_empty() {
+            self.front = fronts::<D>(settings);
+        }
+        let (stencil, front) = (&frame.stencil, &self.front);
+        let Particles { kind, normal, depth, .. } = particles;
+        let share = |s: usize| {
+            let mut sum = 0.0;
+            let all = stencil.neighbours.row(s).0.all().iter().map(|entry| (*entry, 1.0));
+            for_each_weighted(settings, stencil, s, all, |_, weight, r_sj| {
+                if -r_sj.dot(&normal[s]) - depth[s] > IN_FRONT * settings.particle_spacing {
+                    sum += weight;
+                }
+            });
+            let place = depth[s] / settings.support_radius() * (FRONTS - 1) as f64;
+            let full = front[(place.round() as usize).min(FRONTS - 1)];
+            let fill = if full > 0.0 { sum / full } else { 0.0 };
+            ((fill - DRY) / (WET - DRY)).clamp(0.0, 1.0)
+        };
+        let solids = (0..particles.real).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
+        let shares: Vec<_> = solids.map(|s| (s, share(s))).collect();
+        shares.into_iter().for_each(|(s, share)| frame.stencil.volume[s] *= share);
+        frame.images.fill(&mut frame.stencil.volume);
     }
 
     /// What the neighbours of each particle tell, and corrections with a floor.
@@ -198,6 +241,26 @@ impl<const D: usize> Surface<D> {
             *weight = if place[i] == Place::Isolated { 0.0 } else { most };
         });
     }
+}
+
+/// Σ W over a half space of particles, at such depths below it.
+fn fronts<const D: usize>(settings: &Settings) -> Vec<f64> {
+    let (spacing, radius) = (settings.particle_spacing, settings.support_radius());
+    let reach = (radius / spacing).ceil() as i64 + 1;
+    let side = 2 * reach + 1;
+    with_kernel!(settings.kernel, kernel => {
+        let kernel = Smoothing::new(kernel, settings.smoothing_length(), D);
+        let below = |depth: f64| -> f64 {
+            (0..side.pow(D as u32)).map(|cell| {
+                let way: Vector<D> = Vector::from_fn(|axis, _| {
+                    let k = cell / side.pow(axis as u32) % side - reach;
+                    if axis == 0 { depth + (k as f64 + 0.5) * spacing } else { k as f64 * spacing }
+                });
+                if way[0] > depth { kernel.value(way.norm()) } else { 0.0 }
+            }).sum()
+        };
+        (0..FRONTS).map(|k| below(radius * k as f64 / (FRONTS - 1) as f64)).collect()
+    })
 }
 
 /// Solids show the mean correction of the fluid around, as images do that of their source.

@@ -7,7 +7,9 @@ mod open;
 mod profile;
 mod solid;
 
-pub use average::{extend_pressure, extrapolate_pressure, extrapolate_scalar, extrapolate_vector, shepard};
+pub use average::{
+    extend_pressure, extrapolate_pressure, extrapolate_scalar, extrapolate_vector, for_each_weighted, shepard,
+};
 pub use condition::{Condition, PressureRule, VelocityRule, conditions};
 pub use flux::add_wall_flux;
 pub use open::{MassFlow, end_step};
