@@ -22,7 +22,7 @@ FRONT = {1.0: 2.947, 2.0: 4.665}
 (TrixiParticles.jl, the dam break of its validation)."""
 
 FRONT_SPEED = {1.0: 1.49, 2.0: 1.86}
-"""Its speed there [U], for outputs that are not just then."""
+"""Its speed there [√(gH)], for outputs that are not just then."""
 
 TERMS = np.arange(1, 200, 2)
 """Numbers of the terms of the Fourier series."""
@@ -91,7 +91,7 @@ class DamBreak(FreeSurface):
         return self.fluid(position, np.zeros_like(position), self.first_pressure(position))
 
     def first_pressure(self, position: FloatArray) -> FloatArray:
-        """Return the pressure (n,) of an inviscid column just let go [ρU²]: ∇²p = 0, 0 at its top and its free side.
+        """Return the pressure (n,) of an inviscid column just let go [ρgH]: ∇²p = 0, 0 at its top and its free side.
 
         That is 1 − y less what the free side takes off, a Fourier series.
         """

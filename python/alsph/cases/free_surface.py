@@ -18,6 +18,7 @@ from alsph.cases.base import Case
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind, particles
+from alsph.symbols import GENERAL, WATER, Symbols
 
 COURANT = 0.2
 """Courant number of a step where none is given: the shortest waves of the surface are those of gravity."""
@@ -96,13 +97,15 @@ class Levels:
 class FreeSurface(Case):
     """A fluid with a free surface, beyond which is air of no pressure.
 
-    In cases with gravity H is the depth of the fluid, U = √(gH) and g = 1, hence times in √(H/g). A step is that of
+    In cases with gravity D is H, the depth of the fluid, U = √(gH) and g = 1, hence times in √(H/g). A step is that of
     ALSPH with operators that keep momentum and energy where a particle has no neighbours (docs/free_surface.md); the
     other schemes, bodies, inlets and outlets are not there yet.
     """
 
+    symbols: ClassVar[Symbols] = WATER
     settles: ClassVar[bool] = False
     picture_axis: ClassVar[str] = "y"
+    idle: ClassVar[tuple[str, ...]] = ("tolerance", "viscous_theta")
     later_names: ClassVar[tuple[str, ...]] = (ENERGY,)
     gravity: ClassVar[bool] = True
     """Whether the body force (0, −1), in 3-D (0, 0, −1), acts."""
@@ -111,10 +114,21 @@ class FreeSurface(Case):
 
     reynolds: float = Field(default=1e6, gt=0, description="Reynolds number UD/ν [-]")
     scheme: Literal["alsph"] | None = Field(default=None, description="augmented Lagrangian SPH alone")
+    courant: float | None = Field(
+        default=None,
+        gt=0,
+        le=1,
+        description="Courant number of a step, which the penalty follows: the larger of u_max and U times Δt/Δx; 0.2 "
+        "if not given, or none where time_step, penalty_constant or algorithm 2 are [-]",
+    )
+    projection_sweeps: int = Field(
+        default=4, ge=0, le=1000, description="projection sweeps after the iterations of a step [-]"
+    )
     algorithm: Literal["midpoint", 2] = Field(
         default="midpoint", description="derivatives in the middle of the step, or at initial positions"
     )
     shifting: Literal["none"] = Field(default="none", description="none: it would feed thin jets with energy")
+    velocity_laplacian: Literal["scalar"] = Field(default="scalar", description="viscous term per component")
     viscous_order: Literal[2] = Field(default=2, description="order of the viscous term in Δx")
     sweep_weights: Literal["chebyshev", "equal"] | None = Field(
         default="equal", description="how far each projection sweep goes"
@@ -128,6 +142,13 @@ class FreeSurface(Case):
     packing_relaxation: float = Field(
         default=0.0, ge=0, le=1, description="share of a number density above the lattice's that a step takes off [-]"
     )
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **options: Any) -> None:
+        """Call D and U so in a class without gravity that says nothing else."""
+        if cls.symbols is WATER and not cls.gravity:
+            cls.symbols = GENERAL
+        super().__pydantic_init_subclass__(**options)
 
     @model_validator(mode="before")
     @classmethod
@@ -176,7 +197,7 @@ class FreeSurface(Case):
         """Return what this resolution and method cannot carry, and units of another gravity than that of the earth."""
         found = super().remarks()
         if self.gravity and self.units and abs(self.units.factor("acceleration") / GRAVITY - 1) > 0.01:
-            told = f"units: U and D make g = U²/D = {self.units.factor('acceleration'):.3g} m/s²"
+            told = f"units: they make g = {self.units.factor('acceleration'):.3g} m/s²"
             velocity = (GRAVITY * self.units.length) ** 0.5
             found.append(f"{told}; on earth units_velocity is √(gH) = {velocity:.4g}")
         return found

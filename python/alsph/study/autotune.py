@@ -114,7 +114,7 @@ class Tuning:
             ]
             for probe in self.probes
         ]
-        return "\n".join([*lines, "", markdown(header, rows)])
+        return case.symbols("\n".join([*lines, "", markdown(header, rows)]))
 
     def save(self, path: str | Path) -> None:
         """Write ``case.toml`` with the tuned case and ``report.md`` into a folder."""
@@ -209,7 +209,7 @@ class _Tuner:
         self.law = min(developed.time_step_limits().values())
 
     def _say(self, line: str) -> None:
-        self.console.print(line, markup=False)
+        self.console.print(self.case.symbols(line), markup=False)
 
     def time_step(self) -> tuple[float, float]:
         """Return the largest stable and the smallest unstable ΔtU/Δx."""

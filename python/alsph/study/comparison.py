@@ -23,6 +23,7 @@ from alsph.folder.durable import write_text
 from alsph.geometry.shape import Shape
 from alsph.results.run import Run
 from alsph.study.declaration import text
+from alsph.symbols import in_common
 from alsph.tables import markdown
 from alsph.text import in_figure, printable, shown
 
@@ -71,7 +72,8 @@ class Comparison:
                 if name not in names:
                     names.insert(place, name)
                 place = names.index(name) + 1
-        told = [name for name in names if name not in (*OF_PARAMETERS, "message") and not name.startswith("remark ")]
+        left_out = {"message", *(run.symbols(name) for run in self.runs.values() for name in OF_PARAMETERS)}
+        told = [name for name in names if name not in left_out and not name.startswith("remark ")]
         return {name: [summary.get(name) for summary in summaries] for name in told}
 
     @cached_property
@@ -157,6 +159,7 @@ class Comparison:
         pictures |= {file: plotting.profile(curves) for file, curves in profiles.items() if len(curves) > 1}
         for picture in pictures.values():
             plotting.remark(picture, tally([keywords(run.remarks) for run in self.runs.values()]))
+            plotting.rename(picture, in_common(run.symbols for run in self.runs.values()))
         return pictures
 
     def save(self, folder: str | Path) -> list[Path]:

@@ -153,7 +153,8 @@ class Report:
 
     def __str__(self) -> str:
         """Return the table, and what is missing in it."""
-        return "\n\n".join(filter(None, (self._table(), "\n".join(f"- {gap}" for gap in self.gaps))))
+        text = "\n\n".join(filter(None, (self._table(), "\n".join(f"- {gap}" for gap in self.gaps))))
+        return self.results.symbols(text)
 
     def _table(self) -> str:
         if not self.convergences:
@@ -196,13 +197,16 @@ class Report:
             if np.isfinite(found.reference) and found.reference:
                 curves.append(Curve("reference", [0.0, max(spacing)], [found.reference] * 2, style="--", colour="k"))
             panels[found.name] = curves
-        return plotting.panels(panels, r"$\Delta x/D$")
+        figure = plotting.panels(panels, r"$\Delta x/D$")
+        plotting.rename(figure, self.results.symbols)
+        return figure
 
     def save(self) -> None:
         """Write ``convergence.md`` and ``convergence.png``."""
         picture = self.draw()
         lines = ["# Convergence", str(self)]
-        lines += [f"D/Δx = {row['resolution']}: {row['remarks']}" for row in self.results.rows if "remarks" in row]
+        head = self.results.symbols("D/Δx")
+        lines += [f"{head} = {row['resolution']}: {row['remarks']}" for row in self.results.rows if "remarks" in row]
         if picture:
             plotting.save(picture, self.path / "convergence.png", dpi=120)
             lines.append("![Each measure over the particle spacing](convergence.png)")
