@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -13,10 +12,13 @@ from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
+from alsph.analysis.sampling import pressure_on_walls
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
+from alsph.cases.series import Series
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError
+from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Kind, particles
 from alsph.symbols import GENERAL, WATER, Symbols
 
@@ -33,7 +35,7 @@ GRAVITY = 9.81
 """That of the earth [m/s²]."""
 
 
-class Levels:
+class Levels(Series):
     """The depth of the water at gauges over time, in a file of the run folder.
 
     It is what lies in a column around the gauge, over its width: spray counts as what it is, and the level is smooth.
@@ -41,57 +43,91 @@ class Levels:
     Parameters
     ----------
     gauges
-        Their places along x [H].
-    length
-        Length of the tank, from x = 0 [H].
+        Their places along x, in 3-D along x and y (m, 2) [H].
+    lengths
+        Length of the tank along x, in 3-D along x and y, from 0 [H].
     spacing
         Particle spacing Δx [H].
+
+    Raises
+    ------
+    ConfigError
+        If gauges and lengths are not of the same number of directions.
     """
 
     file = "output_levels.csv"
     interval = 0.05
 
-    def __init__(self, gauges: Sequence[float], length: float, spacing: float) -> None:
-        self.gauges, self.length, self.spacing = gauges, length, spacing
-        self.rows: list[str] = []
+    def __init__(
+        self, gauges: Sequence[float] | Sequence[Sequence[float]], lengths: float | Sequence[float], spacing: float
+    ) -> None:
+        self.lengths, self.spacing = np.atleast_1d(np.asarray(lengths, float)), spacing
+        self.gauges = np.asarray(gauges, float).reshape(len(gauges), -1)
+        if self.gauges.shape[1] != len(self.lengths):
+            raise ConfigError("gauges: each needs a place along x, in a tank in 3-D along x and y")
+        places = [
+            "; ".join(f"{axis} = {at:g} H" for axis, at in zip("xy", gauge, strict=False)) for gauge in self.gauges
+        ]
+        super().__init__(["time [√(H/g)]", *(f"depth at {place} [H]" for place in places)])
+
+    def values(self, simulation: Simulation) -> FloatArray:
+        """Return the present depths (m,)."""
+        state = simulation.state()
+        return self.depth(state["position"][state["kind"] == Kind.FLUID])
 
     def depth(self, position: FloatArray) -> FloatArray:
-        """Return the depth (m,) at the gauges of fluid particles at positions (n, 2).
+        """Return the depth (m,) at the gauges of fluid particles at positions (n, d).
 
-        The column reaches four spacings to each side and ends softly; beyond a wall it goes on as in a mirror.
+        The column reaches four spacings to each side, along x and y alike, and ends softly; beyond a wall it goes on as
+        in a mirror.
         """
-        x = np.concatenate([position[:, 0], -position[:, 0], 2 * self.length - position[:, 0]])
-        share = np.abs(x - np.array(self.gauges, float)[:, None]) / (4 * self.spacing)
-        weight = np.where(share < 1, 1 + np.cos(np.pi * share), 0.0)
-        return np.asarray(weight.sum(axis=1) * self.spacing / 8)
+        if position.shape[1] != len(self.lengths) + 1:
+            raise ConfigError(f"gauges: they are of a tank in {len(self.lengths) + 1}-D")
+        share = np.ones((len(self.gauges), len(position)))
+        for axis, length in enumerate(self.lengths):
+            along = position[:, axis]
+            images = np.stack([along, -along, 2 * length - along])
+            away = np.abs(images - self.gauges[:, None, [axis]]) / (4 * self.spacing)
+            share *= np.where(away < 1, 1 + np.cos(np.pi * away), 0.0).sum(axis=1) / 8
+        return np.asarray(share.sum(axis=1) * self.spacing)
 
-    def record(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> None:
-        """Keep the present depths."""
-        depths = self.depth(simulation.state()["position"])
-        self.rows.append(",".join(f"{value:.9g}" for value in (simulation.time, *depths)) + "\n")
 
-    def append(self, path: Path) -> None:
-        """Append them to the file."""
-        with path.open("a", encoding="ascii") as file:
-            file.writelines(self.rows)
-        self.rows = []
+class Sensors(Series):
+    """The mean pressure over sensors in slip walls over time, in a file of the run folder.
 
-    def truncate(self, path: Path, time: float) -> None:
-        """Drop what is later than `time`."""
-        lines = path.read_text(encoding="ascii").splitlines(keepends=True)
-        whole = [line for line in lines if line.endswith("\n")]
-        new = path.with_suffix(".new")
-        new.write_text("".join(line for line in whole if float(line.split(",")[0]) <= time), encoding="ascii")
-        new.replace(path)
+    Where a sensor is dry it feels the air, and no less than that unless the fluid may be in tension.
 
-    @classmethod
-    def read(cls, run: Record) -> tuple[FloatArray, FloatArray]:
-        """Return times (k,) and depths (m, k) of a run [√(H/g), H]; none where there is no file."""
-        path = run.path / cls.file
-        if not path.exists() or not path.stat().st_size:
-            return np.empty(0), np.empty((1, 0))
-        table = np.loadtxt(path, delimiter=",", ndmin=2).T
-        return table[0], table[1:]
+    Parameters
+    ----------
+    sensors
+        Points (k, d) over the extent of each, by name [H].
+    spacing
+        Particle spacing Δx [H].
+    """
+
+    file = "output_sensors.csv"
+    interval = 0.01
+
+    def __init__(self, sensors: Mapping[str, FloatArray], spacing: float) -> None:
+        self.points, self.spacing = np.concatenate([*sensors.values()]), spacing
+        self.first = np.cumsum([0, *map(len, sensors.values())])[:-1]
+        super().__init__(["time [√(H/g)]", *(f"{name} [ρgH]" for name in sensors)])
+
+    def values(self, simulation: Simulation) -> FloatArray:
+        """Return the present pressures (m,)."""
+        state, settings = simulation.state(), simulation.problem.settings
+        fluid = state["kind"] == Kind.FLUID
+        found = pressure_on_walls(
+            state["position"][fluid],
+            state["pressure"][fluid],
+            self.points,
+            self.spacing,
+            Domain.of(settings["domain"]),
+            np.array(settings["body_force"]),
+        )
+        wet = np.nan_to_num(found)
+        felt = wet if settings["free_surface"]["tension"] else np.maximum(wet, 0.0)
+        return np.asarray(np.add.reduceat(felt, self.first) / np.diff([*self.first, len(felt)]))
 
 
 class FreeSurface(Case):
