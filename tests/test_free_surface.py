@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import alsph
@@ -233,6 +234,24 @@ def test_pictures_of_water_have_a_scale_from_the_pressure_of_the_air_on(splash, 
     assert splash.plot_field("vorticity").axes[1].get_ylim()[0] < 0
     patch = cases.RotatingPatch(resolution=10).run(tmp_path / "patch", until=0.1, progress=False)
     assert patch.plot_field("pressure").axes[1].get_ylim()[0] < 0
+
+
+def test_spray_makes_no_colour_scale(splash):
+    """Unless there is nothing else."""
+    snapshot = splash.snapshot(1.0)
+    spray, count = np.array([[4.0, 0.8], [4.1, 0.7], [4.3, 0.9], [4.6, 0.5]]), len(snapshot.kind)
+    extent = plotting.extent_of(snapshot, splash.spacing, (0, 5, 0, 1))
+
+    few = {name: getattr(snapshot, name)[:4] for name in ("velocity", "pressure", "kind")}
+    alone = replace(snapshot, position=spray, vorticity=np.full(4, 50.0), **few)
+    both = {name: np.concatenate([getattr(snapshot, name), few[name]]) for name in few}
+    position = np.concatenate([snapshot.position, spray])
+    water = replace(snapshot, position=position, vorticity=np.repeat([0.5, 50.0], [count, 4]), **both)
+    confined = replace(water, domain=None)
+    limits = [
+        plotting.pictures.colour_limit(each, "vorticity", splash.spacing, extent) for each in (water, confined, alone)
+    ]
+    assert limits[0] == 0.5 and limits[1] > 5 and limits[2] >= 50
 
 
 def test_a_tall_picture_is_no_taller_than_a_page(splash):
