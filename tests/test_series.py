@@ -12,6 +12,7 @@ from alsph.analysis.sampling import pressure_on_walls
 from alsph.cases.dam_break import SENSORS, WINDOWS, Front, impulse_name
 from alsph.cases.free_surface import Levels, Sensors
 from alsph.cases.series import Series
+from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError
 from alsph.geometry.lattice import cell_centres, lattice
 from alsph.geometry.particles import Snapshot
@@ -152,6 +153,18 @@ def test_a_sensor_feels_water_where_it_is_wet_and_air_where_it_is_dry(height, fe
     assert found == pytest.approx(np.maximum(0.6 - heights, 0).mean(), abs=1e-9) == pytest.approx(felt, abs=0.007)
 
 
+def test_a_sensor_in_a_tank_that_sways_feels_what_pushes_the_water():
+    """A pressure that balances gravity and the sway, also at the wall, where it has a slope."""
+    case = cases.Sloshing(resolution=20, amplitude=0.5)
+    simulation = case.simulation(threads=1)
+    state, push = simulation.state(), np.array(case.forcing(None, 0.0))
+    position = state["position"]
+    simulation.restore(state | {"pressure": 3 + position @ (push - [0, 1])})
+    at = np.array([[0.0, 0.3], [0.0, 0.32]])
+    (found,) = Sensors({"one": at}, SPACING).values(simulation)
+    assert abs(push[0]) > 0.5 and found == pytest.approx(3 - 0.31, abs=1e-9)
+
+
 def test_discs_are_of_their_size():
     """The mean over one is that over a disc: of y² about its middle d²/16."""
     for case in (cases.DamBreak(resolution=40), cases.DamBreak(resolution=80, dimensions=3)):
@@ -257,6 +270,11 @@ def test_a_folder_that_is_replaced_keeps_no_old_figure_of_water(alsph, tmp_path)
     }
     assert alsph("run", "still_water", "--resolution=8", "--until=0.1", "--force", "-o", run)[0] == 0
     assert not (run / "figures").exists() and not [*run.glob("output_*")]
+
+
+def test_a_probe_outside_is_refused_in_the_names_of_the_case():
+    with pytest.raises(ConfigError, match=r"lies outside of the domain, .* \[H\]"):
+        _ = Config(cases.StillWater(), RunSettings(probes="5,5")).probes
 
 
 def test_a_width_without_a_third_dimension_is_refused(alsph):

@@ -16,6 +16,7 @@ from alsph.analysis.sampling import pressure_on_walls
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
 from alsph.cases.series import Series
+from alsph.engine.prescribed import asked
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain
@@ -117,13 +118,16 @@ class Sensors(Series):
         """Return the present pressures (m,)."""
         state, settings = simulation.state(), simulation.problem.settings
         fluid = state["kind"] == Kind.FLUID
+        force = np.array(settings["body_force"])
+        if rule := simulation.rules.get("forcing"):  # that of a tank which sways
+            force = force + np.asarray(asked("forcing", rule, self.points, simulation.time)).mean(axis=0)
         found = pressure_on_walls(
             state["position"][fluid],
             state["pressure"][fluid],
             self.points,
             self.spacing,
             Domain.of(settings["domain"]),
-            np.array(settings["body_force"]),
+            force,
         )
         wet = np.nan_to_num(found)
         felt = wet if settings["free_surface"]["tension"] else np.maximum(wet, 0.0)
