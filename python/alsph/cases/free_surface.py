@@ -111,7 +111,7 @@ class Sensors(Series):
 
     def __init__(self, sensors: Mapping[str, FloatArray], spacing: float) -> None:
         self.points, self.spacing = np.concatenate([*sensors.values()]), spacing
-        self.first = np.cumsum([0, *map(len, sensors.values())])[:-1]
+        self.ends = np.cumsum([*map(len, sensors.values())])[:-1]
         super().__init__(["time [√(H/g)]", *(f"{name} [ρgH]" for name in sensors)])
 
     def values(self, simulation: Simulation) -> FloatArray:
@@ -131,7 +131,7 @@ class Sensors(Series):
         )
         wet = np.nan_to_num(found)
         felt = wet if settings["free_surface"]["tension"] else np.maximum(wet, 0.0)
-        return np.asarray(np.add.reduceat(felt, self.first) / np.diff([*self.first, len(felt)]))
+        return np.array([part.mean() for part in np.split(felt, self.ends)])
 
 
 class FreeSurface(Case):
