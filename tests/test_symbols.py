@@ -2,11 +2,13 @@
 
 import re
 
+import alsph
 import pytest
 from alsph import cases, plotting
 from alsph.cli.options import idle
-from alsph.config import Config
+from alsph.config import Config, RunSettings
 from alsph.running.describe import describe
+from alsph.study.convergence import converge
 from alsph.symbols import GENERAL, WATER, Symbols, in_common
 from alsph.watching.watched import Watched
 from matplotlib.text import Text
@@ -119,6 +121,14 @@ def test_only_what_acts_on_nothing_is_hidden():
     assert "driving_force" in hidden["pulsating_channel"]
     assert hidden["taylor_green"] > {"wall_velocity", "wall_pressure", "surface_velocity"}
     assert idle(cases.DamBreak, None) >= {"scheme", "solver", "shift_limit", "viscous_theta"}
+
+
+def test_a_study_of_water_is_told_in_its_names(tmp_path):
+    report = converge(Config(cases.StillWater(), RunSettings(until=0.05)), [8, 10, 12], tmp_path, progress=False)
+    assert "H/Δx = 8" in str(report) and report.draw().axes[0].get_xlabel() == r"$\Delta x/H$"
+    runs = [alsph.Run(tmp_path / "runs" / path.name) for path in sorted((tmp_path / "runs").iterdir())]
+    told = str(alsph.compare(runs))
+    assert "time reached, t√(g/H)" in told and "steps a √(H/g)" in told and not OLD.search(told.replace("CPU", ""))
 
 
 def test_symbols_are_said_once():

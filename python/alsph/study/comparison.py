@@ -23,7 +23,7 @@ from alsph.folder.durable import write_text
 from alsph.geometry.shape import Shape
 from alsph.results.run import Run
 from alsph.study.declaration import text
-from alsph.symbols import in_common
+from alsph.symbols import Symbols, in_common
 from alsph.tables import markdown
 from alsph.text import in_figure, printable, shown
 
@@ -52,6 +52,11 @@ class Comparison:
     """
 
     runs: dict[str, Run]
+
+    @property
+    def symbols(self) -> Symbols:
+        """What the cases call D and U, if all call them the same."""
+        return in_common(run.symbols for run in self.runs.values())
 
     @cached_property
     def parameters(self) -> Table:
@@ -121,7 +126,7 @@ class Comparison:
         parts = [
             markdown(["parameter", *names], parameters) if parameters else "All parameters are the same.",
             markdown(["result", *names, *(f"{name} - {first}" for name in names[1:])], rows),
-            markdown(["cost", *names], [[name, *map(_shown, row)] for name, row in self.costs.items()]),
+            markdown(["cost", *names], [[self.symbols(name), *map(_shown, row)] for name, row in self.costs.items()]),
             "\n".join(f"- {line}" for line in (*below, *self.warnings)),
             *(f"![{name}]({name}.png)" for name in figures),
         ]
@@ -159,7 +164,7 @@ class Comparison:
         pictures |= {file: plotting.profile(curves) for file, curves in profiles.items() if len(curves) > 1}
         for picture in pictures.values():
             plotting.remark(picture, tally([keywords(run.remarks) for run in self.runs.values()]))
-            plotting.rename(picture, in_common(run.symbols for run in self.runs.values()))
+            plotting.rename(picture, self.symbols)
         return pictures
 
     def save(self, folder: str | Path) -> list[Path]:

@@ -140,7 +140,10 @@ class Report:
     @property
     def gaps(self) -> list[str]:
         """Which runs have not finished, and which measures are NaN in which run and why, in words."""
-        places = {float(row["resolution"]): f"D/Δx = {row['resolution']}, {row['folder']}" for row in self.results.rows}
+        name = self.results.symbols("D/Δx")
+        places = {
+            float(row["resolution"]): f"{name} = {row['resolution']}, {row['folder']}" for row in self.results.rows
+        }
         states = zip(places.values(), self.results.states, strict=True)
         gaps = [f"{place}: {state.status}" for place, state in states if state.status != "finished"]
         missing: dict[tuple[str, str], list[str]] = {}
@@ -153,8 +156,7 @@ class Report:
 
     def __str__(self) -> str:
         """Return the table, and what is missing in it."""
-        text = "\n\n".join(filter(None, (self._table(), "\n".join(f"- {gap}" for gap in self.gaps))))
-        return self.results.symbols(text)
+        return "\n\n".join(filter(None, (self._table(), "\n".join(f"- {gap}" for gap in self.gaps))))
 
     def _table(self) -> str:
         if not self.convergences:
@@ -162,7 +164,7 @@ class Report:
         resolutions = self.convergences[0].resolutions
         header = [
             "quantity",
-            *(f"D/Δx = {n:g}" for n in resolutions),
+            *(self.results.symbols(f"D/Δx = {n:g}") for n in resolutions),
             "kind",
             "order",
             "Richardson",
