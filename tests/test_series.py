@@ -1,7 +1,6 @@
 """What runs with a free surface record in small CSV files: levels, front and sensors."""
 
 from dataclasses import fields
-from pathlib import Path
 
 import alsph
 import numpy as np
@@ -234,6 +233,11 @@ def test_curves_of_the_experiments_run_forward_in_time():
         assert len(pressure) == len(reference.table(f"dam_break_pressure_{sensor.curve}.csv")[0])
 
 
+def test_a_sensor_that_the_water_has_not_met_is_not_drawn(tmp_path):
+    run = cases.DamBreak(resolution=8).run(tmp_path / "run", until=0.2, progress=False)
+    assert [profile.name for profile in run.profiles] == ["front"] and Sensors.read(run)[1].shape[0] == 4
+
+
 def test_other_columns_and_tanks_have_no_experiment(tmp_path):
     run = cases.DamBreak(resolution=8, length=1.0, tank_length=2.0).run(tmp_path / "run", until=4.0, progress=False)
     assert [measure.name for measure in run.measures] == ["largest rise of the energy over its start"]
@@ -264,10 +268,8 @@ def test_a_fluid_in_tension_reads_below_the_air(tmp_path):
 def test_a_folder_that_is_replaced_keeps_no_old_figure_of_water(alsph, tmp_path):
     run = tmp_path / "run"
     assert alsph("run", "dam_break", "--resolution=8", "--until=0.1", "-o", run)[0] == 0
-    drawn = alsph("plot", run)[1].split()
-    assert {"front.png", "pressure_at_p1.png", "pressure_at_buchner_s_disc.png"} < {
-        path.name for path in map(Path, drawn)
-    }
+    assert f"{run / 'figures' / 'front.png'}" in alsph("plot", run)[1]
+    (run / "figures" / "pressure_at_buchner_s_disc.png").touch()
     assert alsph("run", "still_water", "--resolution=8", "--until=0.1", "--force", "-o", run)[0] == 0
     assert not (run / "figures").exists() and not [*run.glob("output_*")]
 

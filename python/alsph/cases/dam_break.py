@@ -214,7 +214,7 @@ class DamBreak(FreeSurface):
                 yield Measure(impulse_name(name, window), found, measured, 0.15, sensor.source)
 
     def profiles(self, run: Record) -> list[Profile]:
-        """Return the front and the pressure at each sensor over time."""
+        """Return the front over time, and the pressure at each sensor that the water has met."""
         nothing = np.empty(0), np.empty(0)
         clock = "$t\\sqrt{g/H}$"
         time, front = Front.read(run)
@@ -224,7 +224,7 @@ class DamBreak(FreeSurface):
         for (name, sensor), own in zip(SENSORS.items(), pressure, strict=False):
             known, axes = sensor.measured() if self._is_compared else nothing, (clock, "$p\\,/\\,\\rho gH$")
             drawn.append(Profile(f"pressure at {name}", axes, (time, own), known, sensor.source))
-        return [profile for profile in drawn if len(profile.computed[0])]
+        return [profile for profile in drawn if profile.computed[1].any()]
 
 
 def _impulse(curve: tuple[FloatArray, FloatArray], window: tuple[float, float]) -> float:
