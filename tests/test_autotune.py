@@ -4,7 +4,7 @@ import math
 
 import pytest
 from alsph import config
-from alsph.cases import TaylorGreen
+from alsph.cases import StandingWave, StillWater, TaylorGreen
 from alsph.errors import ConfigError
 from alsph.study.autotune import autotune
 
@@ -50,3 +50,18 @@ def test_numbers_that_cannot_be_used_are_refused(name, number):
     arguments = {"divergence": 1e-3} | {name: number}
     with pytest.raises(ConfigError, match=name):
         autotune(TaylorGreen(), progress=False, **arguments)
+
+
+def test_water_at_rest_is_not_tuned():
+    """What it creeps with is the scheme's doing, which a step that doubles it is not unstable for."""
+    with pytest.raises(ConfigError, match=r"still_water: nothing moves, u_max is .* √\(gH\) at t\* = 1"):
+        autotune(StillWater(resolution=12), develop=1.0, threads=1, progress=False)
+
+
+def test_a_wave_that_grows_from_a_standstill_is_not_unstable():
+    """Velocities are judged beside those of waves, as the Courant number is; u_max is far below and doubles."""
+    tuning = autotune(StandingWave(resolution=8), 0.1, develop=0.1, probe=0.5, margin=0.5, threads=1, progress=False)
+    assert 0.2 < tuning.largest_stable <= 1
+    assert all(probe.stable for probe in tuning.probes if probe.time_step <= 0.4 and probe.projection_sweeps)
+    table = [line for line in str(tuning).splitlines() if line.startswith("|")]
+    assert "Δt√(gH)/Δx" in table[0] and len({*map(len, table)}) == 1

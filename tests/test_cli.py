@@ -4,7 +4,7 @@ import sys
 import pytest
 from alsph import Units, config, open_run, plotting
 from alsph.cases import CASES
-from alsph.cli import app, runs
+from alsph.cli import app, options, runs
 from alsph.cli.app import COMMANDS
 from alsph.results import export
 
@@ -84,6 +84,7 @@ def test_what_is_not_used_is_not_loaded(program, loaded):
         ("alsph run cyl", ["cylinder", "cylinder_pair"]),
         ("alsph run cylinder --scheme ", ["alsph", "isph", "explicit_isph", "wcsph", "edac", "shadloo", "sisph"]),
         ("alsph run cylinder --algorithm m", ["midpoint"]),
+        ("alsph run dam_break --s", ["--sweep-weights", "--smoothing-ratio"]),
         ("alsph plot runs/a --field v", ["vorticity", "velocity", "velocity_divergence"]),
         ("alsph plot runs/a --format p", ["png", "pdf"]),
         ("alsph export runs/a --to ", ["vtkhdf", "netcdf", "csv"]),
@@ -139,11 +140,14 @@ def test_help_teaches_every_parameter(alsph, case, command):
     code, stdout, _ = alsph(command, case, "--help")
     assert code == 0
     words = " ".join(stdout.split())
-    fields = dict(CASES[case].model_fields)
-    del fields["units"]  # a table, whose entries are options
-    for name, field in (fields | {f"units_{name}": field for name, field in Units.model_fields.items()}).items():
-        assert f"--{name.replace('_', '-')} " in words
-        assert field.description in words
+    model = CASES[case]
+    told = {name: model.describe(name) for name in model.model_fields}
+    del told["units"]  # a table, whose entries are options
+    told |= {f"units_{name}": model.symbols(Units.describe(name)) for name in Units.model_fields}
+    idle = options.idle(model, model())
+    for name, description in told.items():
+        assert (f"--{name.replace('_', '-')} " in words) == (name not in idle)
+        assert description in words or name in idle
     assert "--until" in words
 
 

@@ -14,6 +14,7 @@ from alsph.plotting import pressure_coefficient
 from alsph.study import convergence
 from alsph.study.convergence import grid_convergence
 from alsph.study.validation import Entry, Row
+from alsph.symbols import GENERAL
 from battery import ESTIMATED, SETTLED, autoregressive_series, drifting, growing, relaxing, shedding, times, transient
 from scipy.ndimage import gaussian_filter1d
 from synthetic import write_run
@@ -227,7 +228,7 @@ def test_round_off_that_wanders_is_no_development():
 def test_tables_say_what_still_develops():
     early = averages.Estimate(1.25, math.inf, "still developing (lift grows)")
     found = grid_convergence("mean drag coefficient", [10, 20, 40], [1.5, 1.3, early])
-    nothing = SimpleNamespace(rows=[], states=[])
+    nothing = SimpleNamespace(rows=[], states=[], symbols=GENERAL)
     assert "1.25 (still developing)" in str(convergence.Report(None, nothing, [found]))
     assert str(early) == "1.25 ± unknown (still developing)"
     assert str(averages.Estimate(1.25, math.inf, "too few periods")) == "1.25 ± unknown"

@@ -97,7 +97,7 @@ PYTHON = Path(__file__).parents[1] / "python" / "alsph"
 PYTHON_FLOORS = (
     ("_alsph", "arrays", "text"),
     ("errors",),
-    ("memory", "parameters", "tables", "expressions"),
+    ("memory", "parameters", "tables", "expressions", "symbols"),
     ("geometry", "reference", "units"),
     ("analysis", "engine"),
     ("cases", "folder"),

@@ -130,7 +130,8 @@ class Config:
         domain = self.case.checked_domain
         for point in found[~domain.contains(found)]:
             box = f"{list(domain.lower)} to {list(domain.upper)} [D]"
-            raise ConfigError(f"run.probes: {point.tolist()} lies outside of the domain, {box}")
+            told = f"run.probes: {point.tolist()} lies outside of the domain, {box}"
+            raise ConfigError(self.case.symbols(told))
         return found
 
     @property

@@ -15,15 +15,19 @@ from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Kind, Snapshot, neighbour_tree
 
 NEIGHBOURS_PER_DIMENSION = 8
+NEIGHBOURS_AT_WALLS = 16  # the same where walls are mirrors
+LARGEST_AMPLIFICATION = 1.5  # sum of the moduli of what particles count in a fit at a wall: 1.2 to 1.4 amid particles
 SINGULAR = 1e-5  # directions that the neighbours determine less well than this are left out of a fit
 CHUNK = 50_000  # points that fields are interpolated to at a time
 REACH = 4.0  # Δx beyond a periodic side that particles are continued to, farther than fits reach
 VOID = 1.5  # points further than this many Δx from every particle have no value
 
 
-def _nearest(position: FloatArray, points: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
+def _nearest(
+    position: FloatArray, points: FloatArray, per_dimension: int = NEIGHBOURS_PER_DIMENSION
+) -> tuple[FloatArray, NDArray[np.intp]]:
     """Distances (m, k) from each point to its nearest particles, nearest first, and their indices (m, k)."""
-    count = min(NEIGHBOURS_PER_DIMENSION * points.shape[1], len(position))
+    count = min(per_dimension * points.shape[1], len(position))
     distance, index = neighbour_tree(position).query(points, k=[*range(1, count + 1)])
     return distance, index
 
@@ -71,6 +75,8 @@ def at(snapshot: Snapshot, points: FloatArray, spacing: float, domain: Domain) -
     values = np.full((len(points), fields.shape[1]), np.nan)
     gradients = np.full((*values.shape, points.shape[1]), np.nan)
     values[seen], gradients[seen] = interpolate_parts(position, fields, points[seen], spacing)
+    if domain.meets_air:  # beyond the last particles the fit knows nothing of the air
+        values[:, -1] = np.maximum(values[:, -1], min(0.0, float(fields[:, -1].min())))
     return {
         "velocity": values[:, :-1],
         "pressure": values[:, -1],
@@ -123,15 +129,68 @@ def interpolate(
         Derivative of field k along direction d.
     """
     distance, index = _nearest(position, points)
-    weight = np.exp(-0.5 * (distance / spacing) ** 2)[..., None]
-    offset = (position[index] - points[:, None]) / spacing
-    first, second = np.triu_indices(points.shape[1])
-    basis = np.concatenate([np.ones_like(weight), offset, offset[..., first] * offset[..., second]], axis=-1)
+    weight, basis = _basis(distance, position[index] - points[:, None], spacing)
     moments = np.swapaxes(basis, 1, 2) @ (weight * basis)
     coefficients = np.linalg.pinv(moments, SINGULAR, hermitian=True) @ (
         np.swapaxes(basis, 1, 2) @ (weight * values[index])
     )
     return coefficients[:, 0], np.swapaxes(coefficients[:, 1 : points.shape[1] + 1], 1, 2) / spacing
+
+
+def _basis(distance: FloatArray, away: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:
+    """Return weights (m, k, 1) of particles and the functions of a quadratic fit there (m, k, c)."""
+    weight, offset = np.exp(-0.5 * (distance / spacing) ** 2)[..., None], away / spacing
+    first, second = np.triu_indices(offset.shape[-1])
+    return weight, np.concatenate([np.ones_like(weight), offset, offset[..., first] * offset[..., second]], axis=-1)
+
+
+def pressure_on_walls(
+    position: FloatArray,
+    pressure: FloatArray,
+    points: FloatArray,
+    spacing: float,
+    domain: Domain,
+    body_force: FloatArray,
+) -> FloatArray:
+    """Return the pressure of fluid particles at points of slip walls (m,); NaN where none is within 1.5 Δx.
+
+    Walls are mirrors: beyond them p − g·r goes on as before them, its derivative across vanishing, so that points in
+    walls and corners lie amid particles and nothing is extrapolated. There it is a quadratic fit by moving least
+    squares, or the mean where that would make much of what particles differ by, as in spray.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n, d)
+    pressure : ndarray, shape (n,)
+    points : ndarray, shape (m, d)
+    spacing : float
+        Particle spacing Δx.
+    domain : Domain
+        Its sides that are ``slip`` are the walls.
+    body_force : ndarray, shape (d,)
+        Per unit mass, g; the density is 1.
+    """
+    reach = REACH * spacing
+    near = ((position > points.min(axis=0) - reach) & (position < points.max(axis=0) + reach)).all(axis=1)
+    if not near.any():
+        return np.full(len(points), np.nan)
+    place, head = position[near], (pressure - position @ body_force)[near]
+    for axis, sides in enumerate(domain.boundaries):
+        for side, plane in zip(sides, (domain.lower[axis], domain.upper[axis]), strict=True):
+            if side == "slip":
+                close = np.abs(place[:, axis] - plane) < reach
+                image = place[close]
+                image[:, axis] = 2 * plane - image[:, axis]
+                place, head = np.concatenate([place, image]), np.concatenate([head, head[close]])
+    distance, index = _nearest(place, points, NEIGHBOURS_AT_WALLS)
+    weight, basis = _basis(distance, place[index] - points[:, None], spacing)
+    weighted = np.swapaxes(weight * basis, 1, 2)
+    share = (np.linalg.pinv(weighted @ basis, SINGULAR, hermitian=True)[:, :1] @ weighted)[:, 0]
+    with np.errstate(invalid="ignore"):  # far from all particles the weights are zero
+        mean = weight[..., 0] / weight.sum(axis=1)
+    sound = np.abs(share).sum(axis=1, keepdims=True) < LARGEST_AMPLIFICATION
+    found = (np.where(sound, share, mean) * head[index]).sum(axis=1) + points @ body_force
+    return np.where(distance[:, 0] < VOID * spacing, found, np.nan)
 
 
 def interpolate_parts(

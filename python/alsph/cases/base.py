@@ -28,6 +28,7 @@ from alsph.geometry.domain import SolidBody
 from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
 from alsph.memory import check
+from alsph.symbols import GENERAL, Symbols
 
 if TYPE_CHECKING:
     from alsph.results.run import Run
@@ -55,11 +56,14 @@ class Case(Driven):
     """A flow problem with its numerical parameters.
 
     Every case is computed in its own reference units: lengths in D, velocities in U, density in ρ, hence times in D/U,
-    pressures in ρU² and kinematic viscosity 1/Re. What D and U are, each case says.
+    pressures in ρU² and kinematic viscosity 1/Re. What D and U are, each case says, and by `symbols` what they are
+    called in all that is told of it.
     """
 
     name: ClassVar[str]
     title: ClassVar[str]
+    symbols: ClassVar[Symbols] = GENERAL
+    """What results, figures and options call D and U."""
     velocity_max: ClassVar[float] = 1.0
     """Expected largest velocity in U, for estimates of the time step."""
     settles: ClassVar[bool] = True
@@ -70,6 +74,8 @@ class Case(Driven):
     """Parameters that the particles are made for beside what the engine's settings tell: no run changes them."""
     of_the_start: ClassVar[tuple[str, ...]] = ()
     """Parameters of the case that nothing but its own start depends on."""
+    idle: ClassVar[tuple[str, ...]] = ()
+    """Parameters of all cases that nothing in this one depends on, which its help leaves out."""
     later_names: ClassVar[tuple[str, ...]] = ()
     """Measures and profiles, or beginnings of their names, that only a run with some results has."""
     code: ClassVar[Any] = None
@@ -81,6 +87,11 @@ class Case(Driven):
     def parameter_names(cls) -> list[str]:
         """Return the names of the parameters: those of the problem, what drives it, and the numerical method's."""
         return sorted(cls.model_fields, key=lambda name: (name in Method.model_fields, name in RULES.values()))
+
+    @classmethod
+    def describe(cls, name: str) -> str:
+        """Return what the parameter `name` means, with its unit."""
+        return cls.symbols(super().describe(name))
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
@@ -443,7 +454,7 @@ class Case(Driven):
         if step <= limits[binding] or (self.adaptive_time_step and self.adaptive_until is None):
             return None
         law = "courant limit" if binding == "courant" else f"{binding.replace('_', ' ')} stability limit"
-        return (
+        return self.symbols(
             f"time_step = {step:.4g} lies above the {law} "
             f"{limits[binding]:.4g} (ΔtU/Δx at u_max = {self.velocity_max:g} U); "
             "expect divergence: lower time_step or switch adaptive_time_step on"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal, Self
+import math
+from collections.abc import Iterator
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,10 @@ from alsph import reference
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
-from alsph.cases.free_surface import FreeSurface
+from alsph.cases.free_surface import FreeSurface, Sensors
+from alsph.cases.series import Series
+from alsph.engine.output import Output
+from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Boundary, Domain
 from alsph.geometry.lattice import cell_centres, lattice
@@ -21,11 +26,67 @@ FRONT = {1.0: 2.947, 2.0: 4.665}
 """Front [H] at times [√(H/g)] of a column 2H long: WCSPH with 400 particles over H, the authors' own
 (TrixiParticles.jl, the dam break of its validation)."""
 
-FRONT_SPEED = {1.0: 1.49, 2.0: 1.86}
-"""Its speed there [U], for outputs that are not just then."""
-
 TERMS = np.arange(1, 200, 2)
 """Numbers of the terms of the Fourier series."""
+
+
+class Sensor(NamedTuple):
+    """A round pressure sensor in the end wall, and what was measured with it.
+
+    Attributes
+    ----------
+    height, diameter : float
+        Of its middle above the floor, and its own [H].
+    curve : str
+        The file of the pressure over time, ``dam_break_pressure_CURVE.csv``.
+    source : str
+    """
+
+    height: float
+    diameter: float
+    curve: str
+    source: str
+
+    def measured(self) -> tuple[FloatArray, FloatArray]:
+        """Return time (n,) [√(H/g)] and pressure (n,) [ρgH]."""
+        time, pressure = reference.table(f"dam_break_pressure_{self.curve}.csv")
+        order = np.argsort(time, kind="stable")  # digitised points turn back at the impact
+        return time[order], pressure[order]
+
+
+LOBOVSKY, BUCHNER = "experiment, Lobovský et al. (2014)", "experiment, Buchner (2002)"
+
+SENSORS = {
+    "P1": Sensor(0.01, 0.014, "p1", LOBOVSKY),
+    "P3": Sensor(0.1, 0.014, "p3", LOBOVSKY),
+    "P4": Sensor(0.267, 0.014, "p4", LOBOVSKY),
+    "Buchner's disc": Sensor(0.267, 0.15, "buchner", BUCHNER),
+}
+"""Those of Lobovský et al. (J. Fluids Struct. 48 (2014) 407), 4.2 mm at 3, 30 and 80 mm with H = 300 mm, and that of
+Buchner (thesis, TU Delft 2002), 90 mm at 160 mm with H = 600 mm."""
+
+WINDOWS = ((2.4, 3.5), (3.5, 5.5), (5.5, 7.0))
+"""Times [√(H/g)] that impulses are taken between: the impact, the water on the wall, and its fall."""
+
+
+def impulse_name(sensor: str, window: tuple[float, float]) -> str:
+    """Return the name of the measure of ∫ p dt at a sensor."""
+    return f"impulse at {sensor}, t = {window[0]:g} to {window[1]:g}, ρgH√(H/g)"
+
+
+class Front(Series):
+    """How far the water of a dam break has come, over time."""
+
+    file = "output_front.csv"
+    interval = 0.01
+
+    def __init__(self, case: DamBreak) -> None:
+        self.case = case
+        super().__init__(["time [√(H/g)]", "front [H]"])
+
+    def values(self, simulation: Simulation) -> FloatArray:
+        """Return the present front (1,)."""
+        return np.array([self.case.front(simulation.state()["position"])])
 
 
 class DamBreak(FreeSurface):
@@ -33,7 +94,13 @@ class DamBreak(FreeSurface):
 
     name: ClassVar[str] = "dam_break"
     title: ClassVar[str] = "dam break in a tank"
-    later_names: ClassVar[tuple[str, ...]] = (*FreeSurface.later_names, "front at t = ")
+    later_names: ClassVar[tuple[str, ...]] = (
+        *FreeSurface.later_names,
+        "front at t = ",
+        "front",
+        *(impulse_name(sensor, window) for sensor in SENSORS for window in WINDOWS),
+        *(f"pressure at {sensor}" for sensor in SENSORS),
+    )
     velocity_max: ClassVar[float] = 2.0
 
     length: float = Field(default=2.0, gt=0, description="length of the column [H]")
@@ -52,6 +119,8 @@ class DamBreak(FreeSurface):
         self.whole_cells("length", self.length)
         if self.dimensions == 3:
             self.whole_cells("width", self.width)
+        elif self.width != type(self).model_fields["width"].default:
+            raise ConfigError(f"width = {self.width:g}: of a tank in 3-D; give dimensions = 3, too, or leave it out")
         return self
 
     @property
@@ -91,7 +160,7 @@ class DamBreak(FreeSurface):
         return self.fluid(position, np.zeros_like(position), self.first_pressure(position))
 
     def first_pressure(self, position: FloatArray) -> FloatArray:
-        """Return the pressure (n,) of an inviscid column just let go [ρU²]: ∇²p = 0, 0 at its top and its free side.
+        """Return the pressure (n,) of an inviscid column just let go [ρgH]: ∇²p = 0, 0 at its top and its free side.
 
         That is 1 − y less what the free side takes off, a Fourier series.
         """
@@ -104,26 +173,63 @@ class DamBreak(FreeSurface):
         """Return how far the water has come [H]: half a spacing before its third foremost particle, or to the wall."""
         return min(float(np.sort(position[:, 0])[-3:][0] + self.particle_spacing / 2), self.tank_length)
 
+    def outputs(self) -> list[Output]:
+        """Return the records of the front and of the sensors in the end wall."""
+        places = {name: self.disc(sensor.height, sensor.diameter) for name, sensor in SENSORS.items()}
+        return [Front(self), Sensors(places, self.particle_spacing)]
+
+    def disc(self, height: float, diameter: float) -> FloatArray:
+        """Return points (m, d) over a disc in the end wall, in 3-D half-way across, Δx/2 or less apart [H]."""
+        count = max(3, math.ceil(2 * diameter / self.particle_spacing))
+        across, up = diameter * (lattice(*[cell_centres(count, 1 / count)] * 2) - 0.5).T
+        inside = np.hypot(across, up) < diameter / 2
+        wall = np.full(inside.sum(), self.tank_length)
+        sides = [self.width / 2 + across[inside]] if self.dimensions == 3 else []
+        return np.stack([wall, *sides, height + up[inside]], axis=1)
+
     def measures(self, run: Record) -> list[Measure]:
-        """Return the front beside an inviscid computation, before it meets the wall, and what energy was made."""
-        rows = [self._front_at(run, at) for at in FRONT] if self._is_compared else []
-        return [row for row in rows if row] + self.energy_measures(run)
+        """Return the front beside an inviscid computation, impulses beside experiments, and what energy was made."""
+        rows = [*self._fronts(run), *self._impulses(run)] if self._is_compared else []
+        return rows + self.energy_measures(run)
 
     @property
     def _is_compared(self) -> bool:
         return (self.length, self.tank_length) == (2.0, 5.366)
 
-    def _front_at(self, run: Record, at: float) -> Measure | None:
-        near = [time for time in run.times if abs(time - at) < 0.05]
-        if not near:
-            return None
-        front = self.front(run.snapshot(near[0]).position) - FRONT_SPEED[at] * (near[0] - at)
-        return Measure(f"front at t = {at:g}, H", front, FRONT[at], 0.05, "inviscid SPH, H/Δx = 400 (TrixiParticles)")
+    def _fronts(self, run: Record) -> Iterator[Measure]:
+        """Yield the front where the run has come so far: before it meets the wall."""
+        time, front = Front.read(run)
+        source = "inviscid SPH, H/Δx = 400 (TrixiParticles)"
+        for at, known in FRONT.items():
+            if len(time) and time[0] <= at <= time[-1]:
+                yield Measure(f"front at t = {at:g}, H", float(np.interp(at, time, front[0])), known, 0.05, source)
+
+    def _impulses(self, run: Record) -> Iterator[Measure]:
+        """Yield the impulse at each sensor over the windows that the run covers."""
+        time, pressure = Sensors.read(run)
+        covered = [(start, end) for start, end in WINDOWS if len(time) and time[0] <= start and end <= time[-1]]
+        for (name, sensor), own in zip(SENSORS.items(), pressure, strict=False):
+            for window in covered:
+                found, measured = _impulse((time, own), window), _impulse(sensor.measured(), window)
+                yield Measure(impulse_name(name, window), found, measured, 0.15, sensor.source)
 
     def profiles(self, run: Record) -> list[Profile]:
-        """Return the front over time."""
-        times = np.asarray(run.times)
-        fronts = np.array([self.front(run.snapshot(time).position) for time in times])
-        known = tuple(reference.table("dam_break_front.csv")) if self._is_compared else (np.empty(0), np.empty(0))
-        axes = ("$t\\sqrt{g/H}$", "front $x/H$")
-        return [Profile("front", axes, (times, fronts), known, "TrixiParticles, H/Δx = 400")]
+        """Return the front over time, and the pressure at each sensor that the water has met."""
+        nothing = np.empty(0), np.empty(0)
+        clock = "$t\\sqrt{g/H}$"
+        time, front = Front.read(run)
+        known = tuple(reference.table("dam_break_front.csv")) if self._is_compared else nothing
+        drawn = [Profile("front", (clock, "front $x/H$"), (time, front[0]), known, "TrixiParticles, H/Δx = 400")]
+        time, pressure = Sensors.read(run)
+        for (name, sensor), own in zip(SENSORS.items(), pressure, strict=False):
+            known, axes = sensor.measured() if self._is_compared else nothing, (clock, "$p\\,/\\,\\rho gH$")
+            drawn.append(Profile(f"pressure at {name}", axes, (time, own), known, sensor.source))
+        return [profile for profile in drawn if profile.computed[1].any()]
+
+
+def _impulse(curve: tuple[FloatArray, FloatArray], window: tuple[float, float]) -> float:
+    """Return ∫ p dt between two times of a curve that is linear between its points."""
+    time = curve[0]
+    at = np.array([window[0], *time[(time > window[0]) & (time < window[1])], window[1]])
+    pressure = np.interp(at, *curve)
+    return float((np.diff(at) * (pressure[1:] + pressure[:-1])).sum() / 2)

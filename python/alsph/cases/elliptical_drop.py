@@ -14,13 +14,15 @@ from alsph.arrays import FloatArray
 from alsph.cases.free_surface import FreeSurface
 from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_centres, lattice
+from alsph.symbols import Symbols
 
 
 class EllipticalDrop(FreeSurface):
-    """A round drop of radius D with the velocity U (x, −y)/D, without gravity: it becomes an ever longer ellipse."""
+    """A round drop of radius R with the velocity A₀ (x, −y), without gravity: it becomes an ever longer ellipse."""
 
     name: ClassVar[str] = "elliptical_drop"
     title: ClassVar[str] = "drop that is stretched into an ellipse"
+    symbols: ClassVar[Symbols] = Symbols("R", "A₀R", "A₀⁻¹", "A₀", "A₀²R", "ρA₀²R²", "A₀t")
     gravity: ClassVar[bool] = False
     later_names: ClassVar[tuple[str, ...]] = (
         *FreeSurface.later_names,
@@ -30,7 +32,7 @@ class EllipticalDrop(FreeSurface):
         "kinetic energy over its start",
     )
 
-    resolution: int = Field(default=40, ge=8, description="particles per radius, D/Δx [-]")
+    resolution: int = Field(default=40, ge=8, description="particles per radius, R/Δx [-]")
 
     @property
     def default_until(self) -> float:
@@ -43,7 +45,7 @@ class EllipticalDrop(FreeSurface):
 
     @property
     def initial_volume(self) -> float:
-        """That of the round drop [D²]."""
+        """That of the round drop [R²]."""
         return np.pi
 
     def particles(self) -> dict[str, NDArray[Any]]:
@@ -54,7 +56,7 @@ class EllipticalDrop(FreeSurface):
         return self.fluid(position, position * [1.0, -1.0], (1 - (position**2).sum(axis=1)) / 2)
 
     def exact(self, time: float) -> tuple[float, float]:
-        """Return the long semi-axis a [D] and the strain rate A [U/D]: da/dt = A a, dA/dt = A² (1 − a⁴)/(1 + a⁴)."""
+        """Return the long semi-axis a [R] and the strain rate A [A₀]: da/dt = A a, dA/dt = A² (1 − a⁴)/(1 + a⁴)."""
         from scipy.integrate import solve_ivp  # half a second that most commands do without
 
         def rates(_: float, state: FloatArray) -> list[float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -13,11 +12,16 @@ from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
+from alsph.analysis.sampling import pressure_on_walls
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
+from alsph.cases.series import Series
+from alsph.engine.prescribed import asked
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError
+from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Kind, particles
+from alsph.symbols import GENERAL, WATER, Symbols
 
 COURANT = 0.2
 """Courant number of a step where none is given: the shortest waves of the surface are those of gravity."""
@@ -32,7 +36,7 @@ GRAVITY = 9.81
 """That of the earth [m/s²]."""
 
 
-class Levels:
+class Levels(Series):
     """The depth of the water at gauges over time, in a file of the run folder.
 
     It is what lies in a column around the gauge, over its width: spray counts as what it is, and the level is smooth.
@@ -40,69 +44,108 @@ class Levels:
     Parameters
     ----------
     gauges
-        Their places along x [H].
-    length
-        Length of the tank, from x = 0 [H].
+        Their places along x, in 3-D along x and y (m, 2) [H].
+    lengths
+        Length of the tank along x, in 3-D along x and y, from 0 [H].
     spacing
         Particle spacing Δx [H].
+
+    Raises
+    ------
+    ConfigError
+        If gauges and lengths are not of the same number of directions.
     """
 
     file = "output_levels.csv"
     interval = 0.05
 
-    def __init__(self, gauges: Sequence[float], length: float, spacing: float) -> None:
-        self.gauges, self.length, self.spacing = gauges, length, spacing
-        self.rows: list[str] = []
+    def __init__(
+        self, gauges: Sequence[float] | Sequence[Sequence[float]], lengths: float | Sequence[float], spacing: float
+    ) -> None:
+        self.lengths, self.spacing = np.atleast_1d(np.asarray(lengths, float)), spacing
+        self.gauges = np.asarray(gauges, float).reshape(len(gauges), -1)
+        if self.gauges.shape[1] != len(self.lengths):
+            raise ConfigError("gauges: each needs a place along x, in a tank in 3-D along x and y")
+        places = [
+            "; ".join(f"{axis} = {at:g} H" for axis, at in zip("xy", gauge, strict=False)) for gauge in self.gauges
+        ]
+        super().__init__(["time [√(H/g)]", *(f"depth at {place} [H]" for place in places)])
+
+    def values(self, simulation: Simulation) -> FloatArray:
+        """Return the present depths (m,)."""
+        state = simulation.state()
+        return self.depth(state["position"][state["kind"] == Kind.FLUID])
 
     def depth(self, position: FloatArray) -> FloatArray:
-        """Return the depth (m,) at the gauges of fluid particles at positions (n, 2).
+        """Return the depth (m,) at the gauges of fluid particles at positions (n, d).
 
-        The column reaches four spacings to each side and ends softly; beyond a wall it goes on as in a mirror.
+        The column reaches four spacings to each side, along x and y alike, and ends softly; beyond a wall it goes on as
+        in a mirror.
         """
-        x = np.concatenate([position[:, 0], -position[:, 0], 2 * self.length - position[:, 0]])
-        share = np.abs(x - np.array(self.gauges, float)[:, None]) / (4 * self.spacing)
-        weight = np.where(share < 1, 1 + np.cos(np.pi * share), 0.0)
-        return np.asarray(weight.sum(axis=1) * self.spacing / 8)
+        if position.shape[1] != len(self.lengths) + 1:
+            raise ConfigError(f"gauges: they are of a tank in {len(self.lengths) + 1}-D")
+        share = np.ones((len(self.gauges), len(position)))
+        for axis, length in enumerate(self.lengths):
+            along = position[:, axis]
+            images = np.stack([along, -along, 2 * length - along])
+            away = np.abs(images - self.gauges[:, None, [axis]]) / (4 * self.spacing)
+            share *= np.where(away < 1, 1 + np.cos(np.pi * away), 0.0).sum(axis=1) / 8
+        return np.asarray(share.sum(axis=1) * self.spacing)
 
-    def record(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> None:
-        """Keep the present depths."""
-        depths = self.depth(simulation.state()["position"])
-        self.rows.append(",".join(f"{value:.9g}" for value in (simulation.time, *depths)) + "\n")
 
-    def append(self, path: Path) -> None:
-        """Append them to the file."""
-        with path.open("a", encoding="ascii") as file:
-            file.writelines(self.rows)
-        self.rows = []
+class Sensors(Series):
+    """The mean pressure over sensors in slip walls over time, in a file of the run folder.
 
-    def truncate(self, path: Path, time: float) -> None:
-        """Drop what is later than `time`."""
-        lines = path.read_text(encoding="ascii").splitlines(keepends=True)
-        whole = [line for line in lines if line.endswith("\n")]
-        new = path.with_suffix(".new")
-        new.write_text("".join(line for line in whole if float(line.split(",")[0]) <= time), encoding="ascii")
-        new.replace(path)
+    Where a sensor is dry it feels the air, and no less than that unless the fluid may be in tension.
 
-    @classmethod
-    def read(cls, run: Record) -> tuple[FloatArray, FloatArray]:
-        """Return times (k,) and depths (m, k) of a run [√(H/g), H]; none where there is no file."""
-        path = run.path / cls.file
-        if not path.exists() or not path.stat().st_size:
-            return np.empty(0), np.empty((1, 0))
-        table = np.loadtxt(path, delimiter=",", ndmin=2).T
-        return table[0], table[1:]
+    Parameters
+    ----------
+    sensors
+        Points (k, d) over the extent of each, by name [H].
+    spacing
+        Particle spacing Δx [H].
+    """
+
+    file = "output_sensors.csv"
+    interval = 0.01
+
+    def __init__(self, sensors: Mapping[str, FloatArray], spacing: float) -> None:
+        self.points, self.spacing = np.concatenate([*sensors.values()]), spacing
+        self.ends = np.cumsum([*map(len, sensors.values())])[:-1]
+        super().__init__(["time [√(H/g)]", *(f"{name} [ρgH]" for name in sensors)])
+
+    def values(self, simulation: Simulation) -> FloatArray:
+        """Return the present pressures (m,)."""
+        state, settings = simulation.state(), simulation.problem.settings
+        fluid = state["kind"] == Kind.FLUID
+        force = np.array(settings["body_force"])
+        if rule := simulation.rules.get("forcing"):  # that of a tank which sways
+            force = force + np.asarray(asked("forcing", rule, self.points, simulation.time)).mean(axis=0)
+        found = pressure_on_walls(
+            state["position"][fluid],
+            state["pressure"][fluid],
+            self.points,
+            self.spacing,
+            Domain.of(settings["domain"]),
+            force,
+        )
+        wet = np.nan_to_num(found)
+        felt = wet if settings["free_surface"]["tension"] else np.maximum(wet, 0.0)
+        return np.array([part.mean() for part in np.split(felt, self.ends)])
 
 
 class FreeSurface(Case):
     """A fluid with a free surface, beyond which is air of no pressure.
 
-    In cases with gravity H is the depth of the fluid, U = √(gH) and g = 1, hence times in √(H/g). A step is that of
+    In cases with gravity D is H, the depth of the fluid, U = √(gH) and g = 1, hence times in √(H/g). A step is that of
     ALSPH with operators that keep momentum and energy where a particle has no neighbours (docs/free_surface.md); the
     other schemes, bodies, inlets and outlets are not there yet.
     """
 
+    symbols: ClassVar[Symbols] = WATER
     settles: ClassVar[bool] = False
     picture_axis: ClassVar[str] = "y"
+    idle: ClassVar[tuple[str, ...]] = ("tolerance", "viscous_theta")
     later_names: ClassVar[tuple[str, ...]] = (ENERGY,)
     gravity: ClassVar[bool] = True
     """Whether the body force (0, −1), in 3-D (0, 0, −1), acts."""
@@ -111,10 +154,21 @@ class FreeSurface(Case):
 
     reynolds: float = Field(default=1e6, gt=0, description="Reynolds number UD/ν [-]")
     scheme: Literal["alsph"] | None = Field(default=None, description="augmented Lagrangian SPH alone")
+    courant: float | None = Field(
+        default=None,
+        gt=0,
+        le=1,
+        description="Courant number of a step, which the penalty follows: the larger of u_max and U times Δt/Δx; 0.2 "
+        "if not given, or none where time_step, penalty_constant or algorithm 2 are [-]",
+    )
+    projection_sweeps: int = Field(
+        default=4, ge=0, le=1000, description="projection sweeps after the iterations of a step [-]"
+    )
     algorithm: Literal["midpoint", 2] = Field(
         default="midpoint", description="derivatives in the middle of the step, or at initial positions"
     )
     shifting: Literal["none"] = Field(default="none", description="none: it would feed thin jets with energy")
+    velocity_laplacian: Literal["scalar"] = Field(default="scalar", description="viscous term per component")
     viscous_order: Literal[2] = Field(default=2, description="order of the viscous term in Δx")
     wall_velocity: Literal["adami", "morris", "paper"] = Field(
         default="adami", description="velocity that solid particles show to the viscous term"
@@ -131,6 +185,13 @@ class FreeSurface(Case):
     packing_relaxation: float = Field(
         default=0.0, ge=0, le=1, description="share of a number density above the lattice's that a step takes off [-]"
     )
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **options: Any) -> None:
+        """Call D and U so in a class without gravity that says nothing else."""
+        if cls.symbols is WATER and not cls.gravity:
+            cls.symbols = GENERAL
+        super().__pydantic_init_subclass__(**options)
 
     @model_validator(mode="before")
     @classmethod
@@ -179,7 +240,7 @@ class FreeSurface(Case):
         """Return what this resolution and method cannot carry, and units of another gravity than that of the earth."""
         found = super().remarks()
         if self.gravity and self.units and abs(self.units.factor("acceleration") / GRAVITY - 1) > 0.01:
-            told = f"units: U and D make g = U²/D = {self.units.factor('acceleration'):.3g} m/s²"
+            told = f"units: they make g = {self.units.factor('acceleration'):.3g} m/s²"
             velocity = (GRAVITY * self.units.length) ** 0.5
             found.append(f"{told}; on earth units_velocity is √(gH) = {velocity:.4g}")
         return found

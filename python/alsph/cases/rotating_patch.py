@@ -14,13 +14,14 @@ from alsph.arrays import FloatArray
 from alsph.cases.free_surface import FreeSurface
 from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_centres, lattice
+from alsph.symbols import Symbols
 
 TERMS = np.arange(1, 80, 2)
 """Numbers of the terms of the Fourier series."""
 
 
 class RotatingPatch(FreeSurface):
-    """A square of side D that turns with the angular velocity U/D, clockwise, without gravity: it grows arms.
+    """A square of side L that turns with the angular velocity Ω, clockwise, without gravity: it grows arms.
 
     The pressure inside is below that of the air, which tears a fluid apart whose scheme does not hold it together
     (Colagrossi 2003).
@@ -28,6 +29,7 @@ class RotatingPatch(FreeSurface):
 
     name: ClassVar[str] = "rotating_patch"
     title: ClassVar[str] = "rotating square patch"
+    symbols: ClassVar[Symbols] = Symbols("L", "ΩL", "Ω⁻¹", "Ω", "Ω²L", "ρΩ²L²", "Ωt")
     gravity: ClassVar[bool] = False
     tension: ClassVar[bool] = True
     later_names: ClassVar[tuple[str, ...]] = (
@@ -36,7 +38,7 @@ class RotatingPatch(FreeSurface):
         "kinetic energy over its start",
     )
 
-    resolution: int = Field(default=40, ge=8, description="particles per side, D/Δx [-]")
+    resolution: int = Field(default=40, ge=8, description="particles per side, L/Δx [-]")
 
     @property
     def default_until(self) -> float:
@@ -49,7 +51,7 @@ class RotatingPatch(FreeSurface):
 
     @property
     def initial_volume(self) -> float:
-        """That of the square [D²]."""
+        """That of the square [L²]."""
         return 1.0
 
     def particles(self) -> dict[str, NDArray[Any]]:
@@ -60,7 +62,7 @@ class RotatingPatch(FreeSurface):
         return self.fluid(position, velocity, self.first_pressure(position))
 
     def first_pressure(self, position: FloatArray) -> FloatArray:
-        """Return the pressure (n,) of the first instant [ρU²]: ∇²p = 2, 0 on the square, a Fourier series."""
+        """Return the pressure (n,) of the first instant [ρΩ²L²]: ∇²p = 2, 0 on the square, a Fourier series."""
         x, y = (np.sin(np.pi * TERMS[:, None] * (x + 0.5)) for x in position.T)
         m, n = np.meshgrid(TERMS, TERMS, indexing="ij")
         size = -32 / (m * n * np.pi**2) / (np.pi**2 * (m**2 + n**2))

@@ -1,10 +1,11 @@
 """The options of a command, from the parameters of a case and the settings of a run."""
 
+import copy
 import functools
 import inspect
 import re
 import types
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -13,13 +14,15 @@ import typer
 from typer.main import get_command
 
 from alsph import cases, config
-from alsph.cases.method import Method
+from alsph.cases.driven import RULES
+from alsph.cases.method import OWN, Method
 from alsph.cli.common import one_of
 from alsph.cli.help import App, Group
 from alsph.cli.terminal import exit_codes
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters, describe_default
+from alsph.symbols import Symbols
 from alsph.text import shown
 from alsph.units import Units
 
@@ -61,9 +64,10 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
             f"{model.__name__}: its parameter '{clashes[0]}' has the name of an option; give it another one"
         )
     try:
-        until = f"{model().default_until:g}"
+        case = model()
+        until, hidden = f"{case.default_until:g}", idle(model, case)
     except Exception:  # parameters that must be given
-        until = OWN_DEFAULT
+        until, hidden = OWN_DEFAULT, idle(model, None)
 
     @exit_codes()
     def command(context: typer.Context, **values: Any) -> None:
@@ -76,19 +80,50 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
         action(Given(tables, given), **extra)
 
     first = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
-    keywords = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own]
+    told = functools.partial(_options, symbols=model.symbols, idle=hidden)
     parameters = [
         first,
-        *keywords,
-        *_options("Parameters of the problem", model, [name for name in names if name not in Method.model_fields]),
-        *_options("Parameters of the method", model, [name for name in names if name in Method.model_fields]),
-        *_options("Units, all four or none", Units, Units.model_fields, "units_", required=""),
-        *_options("Settings of the run", RunSettings, RunSettings.model_fields, until=until),
+        *(_renamed(parameter, model.symbols) for parameter in own),
+        *told("Parameters of the problem", model, [name for name in names if name not in Method.model_fields]),
+        *told("Parameters of the method", model, [name for name in names if name in Method.model_fields]),
+        *told("Units, all four or none", Units, Units.model_fields, "units_", required=""),
+        *told("Settings of the run", RunSettings, RunSettings.model_fields, until=until),
     ]
     functools.update_wrapper(command, action)
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return command
+
+
+def _renamed(parameter: inspect.Parameter, symbols: Symbols) -> inspect.Parameter:
+    """Return an option of an action whose help has a case's names of D and U."""
+    kind, option = get_args(parameter.annotation)
+    option = copy.copy(option)
+    option.help = symbols(option.help)
+    return parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=Annotated[kind, option])
+
+
+def idle(model: type[cases.Case], case: cases.Case | None) -> set[str]:
+    """Return the options that have nothing to choose or to act on, in a case and, if it can be made, by default."""
+    choices = {name: _option_type(field.annotation)[1] for name, field in model.model_fields.items()}
+    found = {*model.idle} | {name for name, few in choices.items() if len(few) == 1}
+    found |= {name for name, schemes in OWN.items() if not {*schemes} & {*choices["scheme"]}}
+    said = [method for method in RULES if getattr(model, method) is not getattr(cases.Case, method)]
+    found |= {RULES[method] for method in said}
+    if choices["shifting"] == ("none",):
+        found |= {"shift_coefficient", "shift_limit"}
+    if case is not None:
+        bodies, domain = case.checked_bodies, case.checked_domain
+        acts = {
+            "wall_velocity": bodies,
+            "wall_pressure": bodies,
+            "surface_velocity": [body for body in bodies if not body.moves],
+            "inlet_velocity": [*domain.inlets()],
+            "surface_interval": case.surface_points(),
+            "initial_run": not domain.meets_air,
+        }
+        found |= {name for name, on in acts.items() if not on}
+    return found
 
 
 class CaseGroup(Group):
@@ -136,16 +171,19 @@ def _options(
     names: Iterable[str],
     prefix: str = "",
     *,
+    symbols: Symbols,
+    idle: Collection[str],
     until: str = OWN_DEFAULT,
     required: str = "  [required]",
 ) -> Iterator[inspect.Parameter]:
-    """Make an option of each named field of a model; `until` is when a run of the case ends."""
+    """Make an option of each named field of a model, hidden if it is `idle`; `until` is when a run of the case ends."""
     for name in names:
         kind, choices = _option_type(model.model_fields[name].annotation)
         flag = f"--{prefix}{name}".replace("_", "-")
         option = typer.Option(
             f"{flag}/--no-{flag[2:]}" if kind is bool else flag,
-            help=model.describe(name).replace(OWN_DEFAULT, until) + _default(model, name, required),
+            help=symbols(model.describe(name)).replace(OWN_DEFAULT, until) + _default(model, name, required),
+            hidden=name in idle,
             show_default=False,
             rich_help_panel=section,
             parser=_choice_of(choices) if choices else _number_of(kind) if kind in WORDS else None,

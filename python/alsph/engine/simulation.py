@@ -358,7 +358,11 @@ class Simulation:
     def sample(self, points: FloatArray) -> dict[str, FloatArray]:
         """Return the fluid's ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d); NaN far from all fluid."""
         with self._engine() as engine:
-            return engine.sample(_exact("points", points, np.float64, 2))
+            found = engine.sample(_exact("points", points, np.float64, 2))
+        surface = self.problem.settings.get("free_surface")
+        if surface and not surface["tension"]:  # beyond the last particles the fit knows nothing of the air
+            found["pressure"] = np.maximum(found["pressure"], 0.0)
+        return found
 
     def inflow_position(self) -> FloatArray:
         """Return the positions (m, d) of the inlet particles."""

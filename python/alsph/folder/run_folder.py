@@ -48,7 +48,7 @@ OWN = re.compile(
     r"\.?(case\.toml|run\.json|run\.log|\.?lock|(checkpoint(\.previous)?|history|particles|surface|probes|planes|start|breakdown|flow)(\.damaged\d*)?"
     r"\.(h5|csv|vtkhdf|nc))(\.new|\.journal)?"
     r"|(ledger|((forces|spectrum|pressure_coefficient)(_of_\w+)?)|pressure|vorticity|velocity(_divergence|_at_tu_d_\w+)?|q_criterion|lambda_2|kinetic_energy"
-    r"|[uv]_at_[xy]_d_2)\.(png|pdf|svg|gif|mp4|webm)"
+    r"|[uv]_at_[xy]_d_2|front|pressure_at_\w+|elevation_at_the_gauge)\.(png|pdf|svg|gif|mp4|webm)"
 )
 """Names of the files that alsph makes in a run folder and its figures, and removes when the folder is replaced."""
 UNFINISHED = ("starting", "running", "interrupted")

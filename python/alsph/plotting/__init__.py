@@ -4,7 +4,7 @@ from alsph.plotting.animation import Film, animate
 from alsph.plotting.curves import Curve, convergence, panels, pressure_coefficient, profile
 from alsph.plotting.histories import coefficients, forces, ledger, spectrum
 from alsph.plotting.pictures import FIELDS, extent_of, field, field_style, fields
-from alsph.plotting.style import PALETTE, head, remark, save
+from alsph.plotting.style import PALETTE, head, remark, rename, save
 
 __all__ = [
     "FIELDS",
@@ -25,6 +25,7 @@ __all__ = [
     "pressure_coefficient",
     "profile",
     "remark",
+    "rename",
     "save",
     "spectrum",
 ]

@@ -17,7 +17,8 @@ from alsph.errors import ConfigError
 from alsph.folder.durable import check_target, replacing
 from alsph.geometry.plane import Plane
 from alsph.plotting import pictures
-from alsph.plotting.style import remark
+from alsph.plotting.style import remark, rename
+from alsph.symbols import GENERAL, Symbols
 from alsph.text import shown
 
 if TYPE_CHECKING:
@@ -60,13 +61,14 @@ def animate(
     view: tuple[float, float, float, float] | None = None,
     title: str = "",
     said: str = "",
+    symbols: Symbols = GENERAL,
     plane: Plane | None = None,
     progress: Callable[[int, int], None] = lambda done, count: None,
 ) -> None:
     """Make a film of a field; see :meth:`alsph.Run.animate`.
 
-    `title` stands above each picture and `said` below; `plane` is that of a run in 3-D; `progress` is called with the
-    number of pictures that are done, and of all.
+    `title` stands above each picture and `said` below, in `symbols`; `plane` is that of a run in 3-D; `progress` is
+    called with the number of pictures that are done, and of all.
     """
     numbers = {"start": start, "end": end, "every": every, "fps": fps}
     if wrong := [what for what, value in numbers.items() if not isinstance(value, int | float | np.number)]:
@@ -96,6 +98,7 @@ def animate(
                 run.snapshot(time), name, run.spacing, limit=limit, view=view, title=title, plane=plane
             )
             remark(figure, said)
+            rename(figure, symbols)
             yield _pixels(figure)
             progress(done, len(times))
 

@@ -150,9 +150,9 @@ def ledger(run: Run) -> Figure:
             {"fluid particles": fluid / fluid[:1] - 1, "mass in - out": mass / history.get("volume", empty)[:1]},
         ),
         (r"$\Delta tU/\Delta x$", {"time step": history.get("time_step", empty) / run.spacing}),
-        (r"$E\,/\,\rho U^2D^d$", energy),
+        (r"$E\,/\,\rho U^2\,D^d$", energy),
         ("$u_{max}/U$", {"largest velocity": history.get("velocity_max", empty)}),
-        (r"$\dot E\,/\,\rho U^3D^{d-1}$", {}),
+        (r"$\dot E\,D/U\,/\,\rho U^2\,D^d$", {}),
     ]
     figure = blank(12, 8.5)
     grid = figure.subplots(4, 2, sharex=True)

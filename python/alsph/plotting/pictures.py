@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alsph.analysis import sampling
 from alsph.analysis.vortices import DERIVED
@@ -29,6 +30,8 @@ PIXELS_PER_SPACING = 2
 DENSITY = 1.5  # of streamlines: 45 along each side at most
 
 TALLEST = 1.5  # height over width, beyond which the picture is made narrower than its figure
+
+INSIDE = 0.75  # share of the space around that fluid fills, above which it is neither at a free surface nor spray
 
 LARGEST_VIEW = 20_000  # spacings that a picture is wide or high at most
 
@@ -164,8 +167,8 @@ def _draw_field(
     style = field_style(name)
     if limit is not None and not (isinstance(limit, int | float | np.number) and 0 < limit < np.inf):
         raise ConfigError(f"limit = {shown(limit)}: must be a number above zero")
-    picture, body = _raster(snapshot, name, spacing, extent, plane)
-    limit = limit or _limit(picture)
+    picture, body, inside = _raster(snapshot, name, spacing, extent, plane)
+    limit = limit or _limit(picture[inside])
     lowest = -limit if style.signed else 0.0
     frame: dict[str, Any] = {"extent": extent, "origin": "lower"}
     image = axes.imshow(picture, cmap=style.colours, vmin=lowest, vmax=limit, interpolation="bilinear", **frame)
@@ -203,7 +206,8 @@ def colour_limit(
     plane: Plane | None = None,
 ) -> float:
     """Return the end of the colour scale that a picture of a part of the plane has by itself."""
-    return _limit(_raster(snapshot, name, spacing, extent, plane)[0])
+    picture, _, inside = _raster(snapshot, name, spacing, extent, plane)
+    return _limit(picture[inside])
 
 
 def _values(snapshot: Snapshot, name: str, whole: Snapshot, spacing: float) -> FloatArray:
@@ -248,8 +252,12 @@ def extent_of(
 
 def _raster(
     snapshot: Snapshot, name: str, spacing: float, extent: tuple[float, float, float, float], plane: Plane | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return the fluid's field (rows, columns), NaN where there is none, and the share of each pixel that is solid."""
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Return the fluid's field (rows, columns), the share of each pixel that is solid, and which make the colour scale.
+
+    The field is NaN where there is none. Of a fluid with a free surface, gradients at it and in spray, where half the
+    neighbours are missing, make no scale.
+    """
     left, right, bottom, top = extent
     columns, rows = (max(2, round(PIXELS_PER_SPACING * length / spacing)) for length in (right - left, top - bottom))
     x = left + (np.arange(columns) + 0.5) * (right - left) / columns
@@ -260,8 +268,12 @@ def _raster(
         points, snapshot = plane.points(points), plane.near(snapshot, spacing)
     fluid, values = snapshot.fluid, _values(snapshot, name, whole, spacing)
     picture = sampling.average(snapshot.position[fluid], values, points, spacing).reshape(rows, columns)
+    scaled = np.isfinite(picture)
+    if meets_air(whole):
+        full = sampling.fill(snapshot.position[fluid], points, spacing).reshape(rows, columns) > INSIDE
+        scaled = scaled & full if (scaled & full).any() else scaled
     if fluid.all():
-        return picture, np.zeros_like(picture)
+        return picture, np.zeros_like(picture), scaled
     body = sampling.fill(snapshot.position[~fluid], points, spacing)
     if plane is not None:  # which may be one that the flow is computed on one side of
         body = body / np.maximum(body + sampling.fill(snapshot.position[fluid], points, spacing), 0.1)
@@ -269,15 +281,15 @@ def _raster(
     from scipy.ndimage import binary_fill_holes
 
     hollow = binary_fill_holes(body > 0.5) & np.isnan(picture)
-    return picture, np.where(hollow, 1.0, body)
+    return picture, np.where(hollow, 1.0, body), scaled
 
 
-def _limit(picture: FloatArray) -> float:
-    """Return a round end for the colour scale.
+def _limit(values: FloatArray) -> float:
+    """Return a round end for the colour scale of pixels (n,).
 
-    All but one per cent of the pixels stay within it, or more where the field is concentrated in fewer than that.
+    All but one per cent of them stay within it, or more where the field is concentrated in fewer than that.
     """
-    size = np.abs(picture[np.isfinite(picture)])
+    size = np.abs(values)
     if not size.any():
         return 1.0
     largest = max(float(np.percentile(size, 99)), float((size**2).sum() / size.sum()))

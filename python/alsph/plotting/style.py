@@ -11,6 +11,7 @@ import numpy as np
 from alsph.errors import ConfigError
 from alsph.folder.durable import check_target, replacing
 from alsph.parameters import suggest
+from alsph.symbols import GENERAL, Symbols
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -89,6 +90,15 @@ def save(figure: Figure, path: str | Path, **options: Any) -> None:
 def head(figure: Figure, title: str) -> None:
     """Write what a figure is of above it."""
     figure.suptitle(title, fontsize="medium")
+
+
+def rename(figure: Figure, symbols: Symbols) -> None:
+    """Write a figure's labels, which speak of D and U, in the names of a case."""
+    from matplotlib.text import Text
+
+    if symbols != GENERAL:
+        for label in figure.findobj(Text):
+            label.set_text(symbols(label.get_text()))
 
 
 def remark(figure: Figure, text: str) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from alsph.analysis.averages import Estimate
+from alsph.symbols import GENERAL, Symbols
 from alsph.units import QUANTITIES, Quantity, Units
 
 IN_UNITS: dict[str, Quantity] = {
@@ -14,20 +15,21 @@ IN_UNITS: dict[str, Quantity] = {
     ", U": "velocity",
     ", U/D": "rate",
     ", ρU²": "pressure",
-    ", H": "length",
-    ", √(gH)": "velocity",
-    ", √(g/H)": "rate",
-    ", ρgH": "pressure",
     ", tU/D": "time",
     " tU/D": "time",
 }
-"""What a result is whose name ends so."""
+"""What a result is whose name ends so, or so in the names of the case."""
 
 REFERENCE = ", reference"
 
 
 def dimensional(
-    results: Mapping[str, Any], units: Units, dimensions: int, area: float, chord: float
+    results: Mapping[str, Any],
+    units: Units,
+    dimensions: int,
+    area: float,
+    chord: float,
+    symbols: Symbols = GENERAL,
 ) -> dict[str, Estimate]:
     """Return those of the results of a run that have a dimension, in SI, under their names with the unit.
 
@@ -43,11 +45,13 @@ def dimensional(
         A that force coefficients are formed with, a length in 2-D [D], an area in 3-D [D²].
     chord
         Length c that moment coefficients are formed with [D].
+    symbols
+        What the case calls D and U.
     """
     found = {}
     for name, value in results.items():
         base = name.removesuffix(REFERENCE)
-        known = _known(base, dimensions, area, chord)
+        known = _known(base, dimensions, area, chord, symbols)
         if known and isinstance(value, Estimate):
             title, quantity, share = known
             factor = share * units.factor(quantity)
@@ -56,7 +60,9 @@ def dimensional(
     return found
 
 
-def _known(name: str, dimensions: int, area: float, chord: float) -> tuple[str, Quantity, float] | None:
+def _known(
+    name: str, dimensions: int, area: float, chord: float, symbols: Symbols
+) -> tuple[str, Quantity, float] | None:
     """Return what a result is called in SI, its quantity, and the share of its unit that it is given in."""
     if name == "Strouhal number":
         return "shedding frequency", "frequency", 1.0
@@ -66,6 +72,7 @@ def _known(name: str, dimensions: int, area: float, chord: float) -> tuple[str, 
     if "moment coefficient" in name and dimensions == 2:
         return name.replace(" coefficient", ""), "moment_per_length", 0.5 * chord**2
     for end, quantity in IN_UNITS.items():
-        if name.endswith(end):
-            return name.removesuffix(end), quantity, 1.0
+        for said in (end, symbols(end)):
+            if name.endswith(said):
+                return name.removesuffix(said), quantity, 1.0
     return None

@@ -22,6 +22,7 @@ from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_counts, cell_middles, lattice
 from alsph.geometry.particles import Snapshot
 from alsph.parameters import choose
+from alsph.symbols import GENERAL, Symbols
 from alsph.text import shown
 
 if TYPE_CHECKING:
@@ -56,11 +57,14 @@ class Grid:
         ``velocity`` (nx, ny, 2) [U], ``pressure`` (nx, ny) [ρU²] and ``vorticity`` (nx, ny) [U/D]; in 3-D velocity
         and vorticity are of shape (nx, ny, nz, 3). Also ``q_criterion`` and ``lambda_2`` [U²/D²], of the shape of the
         pressure, if they were asked for. NaN in bodies and where there is no fluid.
+    symbols : Symbols
+        What units are told in.
     """
 
     time: float
     axes: dict[str, FloatArray]
     fields: dict[str, FloatArray]
+    symbols: Symbols = GENERAL
 
     def components(self) -> dict[str, FloatArray]:
         """Return the fields with each component of a vector by itself: ``velocity_x``, ``velocity_y``, ..."""
@@ -68,7 +72,8 @@ class Grid:
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the grid as a data set of xarray."""
-        return _dataset(self.axes, self.fields).assign_attrs(time=self.time, time_units="D/U")
+        dataset = _dataset(self.axes, self.fields, self.symbols)
+        return dataset.assign_attrs(time=self.time, time_units=self.symbols.time)
 
     def save(self, path: str | Path) -> Path:
         """Write the grid to a file, whose suffix says the format, and return its path.
@@ -126,6 +131,8 @@ class PlaneRecord:
         Velocities [U], with an axis for each of `axes`.
     pressure : ndarray, shape (k, ...)
         Pressures [ρU²].
+    symbols : Symbols
+        What units are told in.
     """
 
     time: FloatArray
@@ -133,6 +140,7 @@ class PlaneRecord:
     place: dict[str, float]
     velocity: FloatArray
     pressure: FloatArray
+    symbols: Symbols = GENERAL
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the record as a data set of xarray.
@@ -143,10 +151,11 @@ class PlaneRecord:
             If xarray is not installed.
         """
         axes = {"time": self.time, **self.axes}
-        return _dataset(axes, {"velocity": self.velocity, "pressure": self.pressure}).assign_coords(self.place)
+        fields = {"velocity": self.velocity, "pressure": self.pressure}
+        return _dataset(axes, fields, self.symbols).assign_coords(self.place)
 
 
-def plane_records(found: Probes, grids: list[tuple[FloatArray, ...]]) -> list[PlaneRecord]:
+def plane_records(found: Probes, grids: list[tuple[FloatArray, ...]], symbols: Symbols) -> list[PlaneRecord]:
     """Return what was recorded on each plane, given by the coordinates of its points along x, y and z.
 
     Raises
@@ -166,7 +175,8 @@ def plane_records(found: Probes, grids: list[tuple[FloatArray, ...]]) -> list[Pl
         place = {name: float(line[0]) for name, line in zip(AXES, axes, strict=False) if len(line) == 1}
         shape = len(found.time), *map(len, extended.values())
         velocity = found.velocity[:, first:end].reshape(*shape, len(axes))
-        records.append(PlaneRecord(found.time, extended, place, velocity, found.pressure[:, first:end].reshape(shape)))
+        pressure = found.pressure[:, first:end].reshape(shape)
+        records.append(PlaneRecord(found.time, extended, place, velocity, pressure, symbols))
     return records
 
 
@@ -179,14 +189,15 @@ def _components(fields: dict[str, FloatArray], axes: int) -> Iterator[tuple[str,
             yield from ((f"{name}_{axis}", values[..., k]) for k, axis in enumerate(AXES[: values.shape[-1]]))
 
 
-def _dataset(axes: dict[str, FloatArray], fields: dict[str, FloatArray]) -> xarray.Dataset:
+def _dataset(axes: dict[str, FloatArray], fields: dict[str, FloatArray], symbols: Symbols) -> xarray.Dataset:
     """Return fields as a data set of xarray: over time, if it is among the axes, then along z, y and x."""
     columns = {
-        name: ([*axes], values, {"long_name": _long_name(name, own), "units": UNITS[own]})
+        name: ([*axes], values, {"long_name": _long_name(name, own), "units": symbols(UNITS[own])})
         for own, field in fields.items()
         for name, values in _components({own: field}, len(axes))
     }
-    lines = {name: (name, line, {"units": "D/U" if name == "time" else "D"}) for name, line in axes.items()}
+    units = {name: {"units": symbols.time if name == "time" else symbols.length} for name in axes}
+    lines = {name: (name, line, units[name]) for name, line in axes.items()}
     dataset: xarray.Dataset = _library("xarray").Dataset(columns, lines)
     return dataset.transpose(*[name for name in ("time", *reversed(AXES)) if name in axes])
 
@@ -202,6 +213,7 @@ def grid(
     box: tuple[FloatArray, FloatArray],
     domain: Domain,
     derived: Sequence[str] = (),
+    symbols: Symbols = GENERAL,
 ) -> Grid:
     """Return the fields of a snapshot on a regular grid; see :meth:`alsph.Run.to_grid`."""
     spacing = own_spacing if spacing is None else spacing
@@ -223,9 +235,8 @@ def grid(
     for values in fields.values():
         values[solid] = np.nan
     shape = [*map(len, axes.values())]
-    return Grid(
-        snapshot.time, axes, {name: values.reshape(*shape, *values.shape[1:]) for name, values in fields.items()}
-    )
+    shaped = {name: values.reshape(*shape, *values.shape[1:]) for name, values in fields.items()}
+    return Grid(snapshot.time, axes, shaped, symbols)
 
 
 def cloud(snapshot: Snapshot, spacing: float, derived: Sequence[str] = ()) -> pyvista.PolyData:

@@ -23,6 +23,7 @@ from alsph.geometry.particles import Snapshot
 from alsph.geometry.points import checked_box, checked_points
 from alsph.results import export
 from alsph.results.export import Grid, PlaneRecord
+from alsph.symbols import GENERAL, Symbols
 from alsph.text import shown
 
 if TYPE_CHECKING:
@@ -51,6 +52,14 @@ class Fields:
     def config(self) -> Config:
         """The case and the settings of the run, as the objects that :attr:`case` was written from."""
         return of_run(self.path)
+
+    @cached_property
+    def symbols(self) -> Symbols:
+        """What the case calls D and U."""
+        try:
+            return self.config.case.symbols
+        except RunFolderError:  # of a case that is not known
+            return GENERAL
 
     @cached_property
     def times(self) -> FloatArray:
@@ -93,7 +102,7 @@ class Fields:
         """
         grids = self.config.planes
         found = reading.probes(self.path / "planes.h5", self.config.case.space_dimensions)
-        return export.plane_records(found, grids)
+        return export.plane_records(found, grids, self.symbols)
 
     def sample(self, points: ArrayLike, time: float | None = None) -> dict[str, FloatArray]:
         """Velocity, pressure and their gradients at any points of a snapshot.
@@ -170,7 +179,7 @@ class Fields:
         domain = self.config.case.checked_domain
         corners = domain.lower if lower is None else lower, domain.upper if upper is None else upper
         box = checked_box(*corners, domain.dimensions)
-        return export.grid(self.snapshot(time), self.spacing, spacing, box, domain, derived)
+        return export.grid(self.snapshot(time), self.spacing, spacing, box, domain, derived, self.symbols)
 
     def to_xarray(
         self,

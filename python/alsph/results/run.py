@@ -125,7 +125,8 @@ class Run(Loads):
         """
         case = self.config.case
         solved = unsolved(self, case.residual_tolerance, case.most_iterations)
-        return [*outcome(self, self.config.until), *solved, *self._judged[1], *case.remarks()]
+        found = [*outcome(self, self.config.until), *solved, *self._judged[1], *case.remarks()]
+        return [self.symbols(remark) for remark in found]
 
     @property
     def units(self) -> Units | None:
@@ -150,17 +151,18 @@ class Run(Loads):
             case = case.replace(units=units, reynolds=case.reynolds)
         if case.units is None:
             raise ConfigError(f"{self.path}: its case has no units; use run.dimensional(alsph.Units(...))")
-        return dimensional(self._results(), case.units, case.space_dimensions, case.reference_area, case.chord)
+        lengths = case.reference_area, case.chord
+        return dimensional(self._results(), case.units, case.space_dimensions, *lengths, case.symbols)
 
     def summary(self) -> dict[str, Any]:
         """Return the run's main results by name, its measures each followed by the reference value where there is one.
 
         Where the case has units, the results in SI follow. ``str()`` of each value is fit to be read.
         """
-        results = self._results()
+        results = {self.symbols(name): value for name, value in self._results().items()}
         if self.units is not None:
             known = {name: value for name, value in self.dimensional().items() if not np.isnan(value)}
-            results |= {"units": str(self.units)} | known
+            results |= {"units": self.symbols(str(self.units))} | known
         results |= {f"remark {number}": remark for number, remark in enumerate(self.remarks, 1)}
         return {name: value for name, value in results.items() if value != ""}
 
@@ -299,7 +301,7 @@ class Run(Loads):
         if path is None:
             check_folder(self.path / "figures")
         target: Path = _plotting().Film(path if path is not None else self.path / "figures" / f"{name}.gif")
-        _plotting().animate(self, name, target, title=self._title, said=self._said(), **options)
+        _plotting().animate(self, name, target, title=self._title, said=self._said(), symbols=self.symbols, **options)
         return target
 
     def plot_pressure_coefficient(
@@ -337,6 +339,7 @@ class Run(Loads):
         if not headed:
             _plotting().head(figure, ", ".join(filter(None, (self._title, body and in_figure(body)))))
         _plotting().remark(figure, self._said())
+        _plotting().rename(figure, self.symbols)
         if path is not None:
             _plotting().save(figure, path)
         return figure
@@ -360,9 +363,8 @@ class Run(Loads):
         """Name the folder, the case, the status and the time reached."""
         time = self.history["time"]
         reached = time[-1] if len(time) else 0.0
-        return printable(
-            f"Run('{self.path}': {shown_name(self.case.get('case', 'unknown'))}, {self.status}, tU/D = {reached:.4g})"
-        )
+        name, clock = shown_name(self.case.get("case", "unknown")), self.symbols.clock
+        return printable(f"Run('{self.path}': {name}, {self.status}, {clock} = {reached:.4g})")
 
     def _repr_html_(self) -> str:
         rows = ((html.escape(name), html.escape(printable(str(value)))) for name, value in self.summary().items())

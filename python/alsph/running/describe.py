@@ -79,7 +79,8 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
             lines.append(("warning", f"breaks down in the first steps: {error}"))
     if warning := case.time_step_warning():
         lines.append(("warning", warning))
-    return lines + [("remark", remark) for remark in remarks_of(config, problem.state)]
+    lines += [("remark", remark) for remark in remarks_of(config, problem.state)]
+    return [(case.symbols(name), case.symbols(text)) for name, text in lines]
 
 
 def _in_si(units: Units, step: float, until: float) -> list[tuple[str, str]]:

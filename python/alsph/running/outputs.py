@@ -97,7 +97,7 @@ class SurfacePressure(Samples):
 
 def remarks_of(config: Config, state: Mapping[str, Any]) -> list[str]:
     """Return what is to be said of a run's case and of its probes, given its particles at the start."""
-    return [*config.case.remarks(), *_in_a_body(config.probes, state)]
+    return [config.case.symbols(remark) for remark in (*config.case.remarks(), *_in_a_body(config.probes, state))]
 
 
 def _in_a_body(probes: FloatArray, state: Mapping[str, Any]) -> list[str]:

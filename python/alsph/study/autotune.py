@@ -31,6 +31,9 @@ SMALLEST_STEP = 1e-3
 BLOWN_UP = 2.0
 """A probe whose u_max exceeds that of the developed state by this factor is unstable, broken down or not."""
 
+AT_REST = 1e-3
+"""Share of the velocity of waves below which what moves beside a free surface is the scheme's doing."""
+
 ITERATIONS = (1, 2, 3, 5, 8, 12, 20)
 SWEEPS = (0, 2, 4, 8)
 
@@ -102,7 +105,8 @@ class Tuning:
             f"time_step = {case.largest_time_step:.4g}, max_iterations = {case.max_iterations}, "
             f"projection_sweeps = {case.projection_sweeps}: {best}",
         ]
-        header = ["ΔtU/Δx", "iterations", "sweeps", "stable", "mean |∇·u| D/U", "s a unit of time"]
+        header = [case.symbols("ΔtU/Δx"), "iterations", "sweeps", "stable", case.symbols("mean |∇·u| D/U")]
+        header.append("s a unit of time")
         rows = [
             [
                 f"{probe.time_step:.4g}",
@@ -114,7 +118,7 @@ class Tuning:
             ]
             for probe in self.probes
         ]
-        return "\n".join([*lines, "", markdown(header, rows)])
+        return "\n".join([*map(case.symbols, lines), "", markdown(header, rows)])
 
     def save(self, path: str | Path) -> None:
         """Write ``case.toml`` with the tuned case and ``report.md`` into a folder."""
@@ -160,7 +164,7 @@ def autotune(
     Raises
     ------
     ConfigError
-        If a number cannot be used, or no time step is stable.
+        If a number cannot be used, no time step is stable, or nothing moves beside a free surface.
     SolverError
         If the flow breaks down while it is developed.
     """
@@ -205,11 +209,16 @@ class _Tuner:
             left = (clock.monotonic() - started) * (develop / simulation.time - 1) if simulation.time else math.nan
             self._say(f"  t* {simulation.time:.3g}, ETA {duration(left)}")
         self.state = simulation.state()
-        self.velocity_max = float(simulation.history()["velocity_max"][-1])
+        surface = simulation.problem.settings.get("free_surface") or {}
+        own, reference = float(simulation.history()["velocity_max"][-1]), surface.get("reference_velocity", 0.0)
+        if own < AT_REST * reference:
+            told = f"nothing moves, u_max is {own:.2g} U at t* = {develop:g}: no step and no divergence can be judged"
+            raise ConfigError(case.symbols(f"{case.name}: {told}; tune a case that flows, or a longer develop"))
+        self.velocity_max = max(own, reference)  # as a step beside a free surface counts it
         self.law = min(developed.time_step_limits().values())
 
     def _say(self, line: str) -> None:
-        self.console.print(line, markup=False)
+        self.console.print(self.case.symbols(line), markup=False)
 
     def time_step(self) -> tuple[float, float]:
         """Return the largest stable and the smallest unstable ΔtU/Δx."""

@@ -23,6 +23,7 @@ from alsph.folder.durable import write_text
 from alsph.geometry.shape import Shape
 from alsph.results.run import Run
 from alsph.study.declaration import text
+from alsph.symbols import Symbols, in_common
 from alsph.tables import markdown
 from alsph.text import in_figure, printable, shown
 
@@ -52,6 +53,11 @@ class Comparison:
 
     runs: dict[str, Run]
 
+    @property
+    def symbols(self) -> Symbols:
+        """What the cases call D and U, if all call them the same."""
+        return in_common(run.symbols for run in self.runs.values())
+
     @cached_property
     def parameters(self) -> Table:
         """The parameters and settings that differ, of each run; None where a run's case has no such parameter."""
@@ -71,7 +77,8 @@ class Comparison:
                 if name not in names:
                     names.insert(place, name)
                 place = names.index(name) + 1
-        told = [name for name in names if name not in (*OF_PARAMETERS, "message") and not name.startswith("remark ")]
+        left_out = {"message", *(run.symbols(name) for run in self.runs.values() for name in OF_PARAMETERS)}
+        told = [name for name in names if name not in left_out and not name.startswith("remark ")]
         return {name: [summary.get(name) for summary in summaries] for name in told}
 
     @cached_property
@@ -119,7 +126,7 @@ class Comparison:
         parts = [
             markdown(["parameter", *names], parameters) if parameters else "All parameters are the same.",
             markdown(["result", *names, *(f"{name} - {first}" for name in names[1:])], rows),
-            markdown(["cost", *names], [[name, *map(_shown, row)] for name, row in self.costs.items()]),
+            markdown(["cost", *names], [[self.symbols(name), *map(_shown, row)] for name, row in self.costs.items()]),
             "\n".join(f"- {line}" for line in (*below, *self.warnings)),
             *(f"![{name}]({name}.png)" for name in figures),
         ]
@@ -157,6 +164,7 @@ class Comparison:
         pictures |= {file: plotting.profile(curves) for file, curves in profiles.items() if len(curves) > 1}
         for picture in pictures.values():
             plotting.remark(picture, tally([keywords(run.remarks) for run in self.runs.values()]))
+            plotting.rename(picture, self.symbols)
         return pictures
 
     def save(self, folder: str | Path) -> list[Path]:

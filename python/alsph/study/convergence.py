@@ -140,7 +140,10 @@ class Report:
     @property
     def gaps(self) -> list[str]:
         """Which runs have not finished, and which measures are NaN in which run and why, in words."""
-        places = {float(row["resolution"]): f"D/Δx = {row['resolution']}, {row['folder']}" for row in self.results.rows}
+        name = self.results.symbols("D/Δx")
+        places = {
+            float(row["resolution"]): f"{name} = {row['resolution']}, {row['folder']}" for row in self.results.rows
+        }
         states = zip(places.values(), self.results.states, strict=True)
         gaps = [f"{place}: {state.status}" for place, state in states if state.status != "finished"]
         missing: dict[tuple[str, str], list[str]] = {}
@@ -161,7 +164,7 @@ class Report:
         resolutions = self.convergences[0].resolutions
         header = [
             "quantity",
-            *(f"D/Δx = {n:g}" for n in resolutions),
+            *(self.results.symbols(f"D/Δx = {n:g}") for n in resolutions),
             "kind",
             "order",
             "Richardson",
@@ -196,13 +199,16 @@ class Report:
             if np.isfinite(found.reference) and found.reference:
                 curves.append(Curve("reference", [0.0, max(spacing)], [found.reference] * 2, style="--", colour="k"))
             panels[found.name] = curves
-        return plotting.panels(panels, r"$\Delta x/D$")
+        figure = plotting.panels(panels, r"$\Delta x/D$")
+        plotting.rename(figure, self.results.symbols)
+        return figure
 
     def save(self) -> None:
         """Write ``convergence.md`` and ``convergence.png``."""
         picture = self.draw()
         lines = ["# Convergence", str(self)]
-        lines += [f"D/Δx = {row['resolution']}: {row['remarks']}" for row in self.results.rows if "remarks" in row]
+        head = self.results.symbols("D/Δx")
+        lines += [f"{head} = {row['resolution']}: {row['remarks']}" for row in self.results.rows if "remarks" in row]
         if picture:
             plotting.save(picture, self.path / "convergence.png", dpi=120)
             lines.append("![Each measure over the particle spacing](convergence.png)")

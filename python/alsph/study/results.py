@@ -26,6 +26,7 @@ from alsph.plotting.curves import Curve
 from alsph.results.run import Run
 from alsph.study.declaration import Figure, Point, Study, text
 from alsph.study.state import ENDED, RUNS, State, states
+from alsph.symbols import Symbols, in_common
 from alsph.tables import markdown
 from alsph.text import in_figure, printable
 
@@ -230,6 +231,11 @@ class Results:
         )
         return f"<table><tr>{head}</tr>{body}</table>"
 
+    @property
+    def symbols(self) -> Symbols:
+        """What the cases call D and U, if all call them the same."""
+        return in_common(point.config.case.symbols for point in self.study.points())
+
     def draw(self) -> dict[str, Picture]:
         """Return the figures that can be drawn from the runs that have finished, by name."""
         draw = {"curves": self._curves, "profile": self._profiles, "fields": self._fields}
@@ -237,6 +243,7 @@ class Results:
         for figure in self.study.figures:
             if picture := draw[figure.kind](figure):
                 plotting.remark(picture, tally([self.rows[k].get("remarks", "") for k in self._chosen(figure)]))
+                plotting.rename(picture, self.symbols)
                 pictures[figure.name] = picture
         return pictures
 

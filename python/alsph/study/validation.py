@@ -359,6 +359,7 @@ def _draw(entry: Entry, runs: list[Run], rows: list[Row], path: Path) -> dict[st
         figures["convergence"] = plotting.convergence(errors)
     titles = {}
     for name, figure in figures.items():
+        plotting.rename(figure, cases.find(entry.case).symbols)
         plotting.save(figure, path / f"{entry.file_name}_{name}.png")
         titles[f"{entry.file_name}_{name}.png"] = ", ".join([entry.case, *entry.settings, name.replace("_", " ")])
     return titles

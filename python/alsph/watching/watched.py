@@ -22,6 +22,7 @@ from alsph.folder.reading import History
 from alsph.plotting.histories import robust_limits
 from alsph.results.outcome import has_surface
 from alsph.results.run import Run
+from alsph.symbols import Symbols
 from alsph.text import contents, duration, printable
 
 FILES = ("case.toml", "run.json", "history.csv", "surface.h5", "particles.vtkhdf", "figures")
@@ -92,6 +93,8 @@ class Watched:
             "resolution": f"{run.case['resolution']:g}",
             "status": printable(run.status),
             "message": printable(str(run.info.get("message", ""))),
+            "clock": run.symbols.clock,
+            "length": run.symbols.length,
             "progress": _tried(problems, lambda: _progress(run), {}),
             "time": _thinned(run.history["time"]),
             "panels": [
@@ -207,9 +210,9 @@ def _progress(run: Run) -> dict[str, Any]:
     return found
 
 
-def _panel(title: str, curves: dict[str, FloatArray], **options: Any) -> dict[str, Any]:
+def _panel(symbols: Symbols, title: str, curves: dict[str, FloatArray], **options: Any) -> dict[str, Any]:
     """Return curves over time as they are drawn in a panel."""
-    return {"title": title, "curves": {name: _thinned(values) for name, values in curves.items()}, **options}
+    return {"title": symbols(title), "curves": {name: _thinned(values) for name, values in curves.items()}, **options}
 
 
 def _forces(run: Run) -> list[dict[str, Any]]:
@@ -220,13 +223,13 @@ def _forces(run: Run) -> list[dict[str, Any]]:
         kinetic, potential = (run.history.get(f"{name}_energy", missing) for name in ("kinetic", "potential"))
         if has_surface(run.history) and potential.any():
             curves = {"kinetic": kinetic, "potential": potential, "both": kinetic + potential}
-            return [_panel("energy E / ρU²Dᵈ", curves)]
-        return [_panel("kinetic energy E / ρU²Dᵈ", {"energy": kinetic})]
+            return [_panel(run.symbols, "energy E / ρU² Dᵈ", curves)]
+        return [_panel(run.symbols, "kinetic energy E / ρU² Dᵈ", {"energy": kinetic})]
     found = []
     for name, axis in (("drag", "x"), ("lift", "y")):
         curves = {part: run.coefficient(axis, part) for part in ("total", "pressure", "viscous")}
         limits = robust_limits([(time, values) for values in curves.values()])
-        found.append(_panel(f"{name} coefficient", curves, of=name, limits=limits))
+        found.append(_panel(run.symbols, f"{name} coefficient", curves, of=name, limits=limits))
     return found
 
 
@@ -235,9 +238,9 @@ def _numerics(run: Run) -> list[dict[str, Any]]:
     history, missing = run.history, np.full(len(run.history["time"]), np.nan)
     largest, mean = (history.get(f"divergence_{name}", missing) for name in ("max", "mean"))
     return [
-        _panel("velocity divergence |∇·u| D/U", {"largest": largest, "mean": mean}, log=True),
-        _panel("iterations of a step", {"iterations": history.get("iterations", missing)}),
-        _panel("time step ΔtU/Δx", {"time step": history.get("time_step", missing) / run.spacing}),
+        _panel(run.symbols, "velocity divergence |∇·u| D/U", {"largest": largest, "mean": mean}, log=True),
+        _panel(run.symbols, "iterations of a step", {"iterations": history.get("iterations", missing)}),
+        _panel(run.symbols, "time step ΔtU/Δx", {"time step": history.get("time_step", missing) / run.spacing}),
     ]
 
 
@@ -254,7 +257,8 @@ def _thinned(values: FloatArray) -> list[float | None]:
 
 def _judged(run: Run, problems: list[str]) -> dict[str, Any]:
     """Return what ``alsph info`` tells, the window, the means that are drawn, and the remarks."""
-    known = ("case", "Reynolds number", "resolution, D/Δx", "status", "message", "computing time")
+    resolution = run.symbols("resolution, D/Δx")
+    known = ("case", "Reynolds number", resolution, "status", "message", "computing time")
     summary = _tried(problems, run.summary, {})
     rows = [(name, value) for name, value in summary.items() if name not in known and not name.startswith("remark ")]
     found: dict[str, Any] = {
@@ -286,6 +290,7 @@ def _png(run: Run, field: str, width: float, ink: str) -> bytes:
     with matplotlib.rc_context(settings):
         snapshot = run.snapshot()
         figure = plotting.field(snapshot, field, run.spacing, width=width, plane=run.plane(snapshot))
+        plotting.rename(figure, run.symbols)
         file = io.BytesIO()
         figure.savefig(file, format="png", dpi=150, bbox_inches="tight")
     return file.getvalue()

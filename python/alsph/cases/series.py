@@ -1,0 +1,89 @@
+"""Numbers over time, such as those of gauges, in small CSV files of the run folder."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
+from alsph.engine.simulation import Simulation
+
+
+class Series(ABC):
+    """Numbers over time in a CSV file of the run folder, an :class:`alsph.engine.output.Output`.
+
+    A line that names the columns comes first; files of older versions have none, and are read and go on as they are.
+
+    Parameters
+    ----------
+    columns
+        What the numbers are, with their units and without commas; the first is the time.
+
+    Attributes
+    ----------
+    file : str
+        Its name, ``output_NAME.csv``.
+    interval : float
+        Time between two records [D/U].
+    """
+
+    file: str
+    interval: float
+
+    def __init__(self, columns: Sequence[str]) -> None:
+        self.columns = columns
+        self.rows: list[str] = []
+
+    @abstractmethod
+    def values(self, simulation: Simulation) -> FloatArray:
+        """Return the present numbers (m,)."""
+
+    def record(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> None:
+        """Keep them."""
+        numbers = simulation.time, *self.values(simulation)
+        self.rows.append(",".join(f"{number:.9g}" for number in numbers) + "\n")
+
+    def append(self, path: Path) -> None:
+        """Append what has been kept to the file."""
+        with path.open("a", encoding="utf-8") as file:
+            if not file.tell():
+                file.write(",".join(self.columns) + "\n")
+            file.writelines(self.rows)
+        self.rows = []
+
+    def truncate(self, path: Path, time: float) -> None:
+        """Drop what is later than `time`, and a line that was cut."""
+        head, rows = _lines(path)
+        new = path.with_name(f"{path.name}.new")
+        new.write_text("".join(head + [row for row in rows if _time(row) <= time]), encoding="utf-8")
+        new.replace(path)
+
+    @classmethod
+    def read(cls, run: Record) -> tuple[FloatArray, FloatArray]:
+        """Return times (k,) and numbers (m, k) of a run; (0,) and (1, 0) where it has none."""
+        path = run.path / cls.file
+        rows = _lines(path)[1] if path.exists() else []
+        if not rows:
+            return np.empty(0), np.empty((1, 0))
+        table = np.loadtxt(rows, delimiter=",", ndmin=2).T
+        return table[0], table[1:]
+
+
+def _lines(path: Path) -> tuple[list[str], list[str]]:
+    """Return the whole lines of a file that hold no numbers, and those that do."""
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines(keepends=True) if line.endswith("\n")]
+    first = 1 if lines and np.isnan(_time(lines[0])) else 0
+    return lines[:first], lines[first:]
+
+
+def _time(line: str) -> float:
+    try:
+        return float(line.split(",")[0])
+    except ValueError:
+        return np.nan

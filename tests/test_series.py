@@ -1,0 +1,288 @@
+"""What runs with a free surface record in small CSV files: levels, front and sensors."""
+
+from dataclasses import fields
+
+import alsph
+import numpy as np
+import pytest
+from alsph import Domain, cases, reference
+from alsph.analysis import sampling
+from alsph.analysis.sampling import pressure_on_walls
+from alsph.cases.dam_break import SENSORS, WINDOWS, Front, impulse_name
+from alsph.cases.free_surface import Levels, Sensors
+from alsph.cases.series import Series
+from alsph.config import Config, RunSettings
+from alsph.errors import ConfigError
+from alsph.geometry.lattice import cell_centres, lattice
+from alsph.geometry.particles import Snapshot
+
+SPACING = 0.05
+TANK = Domain([0, 0], [2, 3], [("slip", "slip"), ("slip", "air")])
+DOWN = np.array([0.0, -1.0])
+
+
+class Count(Series):
+    """How often it was asked."""
+
+    file = "output_count.csv"
+    interval = 1.0
+
+    def values(self, simulation):
+        return np.array([simulation.time, 2.0])
+
+
+class At:
+    """What a series asks of a simulation."""
+
+    def __init__(self, time):
+        self.time = time
+
+
+class Record:
+    """What a series asks of a run."""
+
+    def __init__(self, path):
+        self.path = path
+
+
+def recorded(path, times):
+    series = Count(["time [s]", "time again [s]", "two [-]"])
+    for time in times:
+        series.record(At(time), {})
+        series.append(path)
+
+
+def test_a_series_names_its_columns_once_and_is_read(tmp_path):
+    path = tmp_path / Count.file
+    recorded(path, [0.5, 1.0])
+    recorded(path, [1.5])
+    assert path.read_text() == "time [s],time again [s],two [-]\n0.5,0.5,2\n1,1,2\n1.5,1.5,2\n"
+    times, values = Count.read(Record(tmp_path))
+    assert times.tolist() == [0.5, 1, 1.5] and values.tolist() == [[0.5, 1, 1.5], [2, 2, 2]]
+
+
+@pytest.mark.parametrize("head", ["time [s],time again [s],two [-]\n", ""])
+def test_a_series_is_cut_with_its_run_and_one_of_an_older_version_too(tmp_path, head):
+    path = tmp_path / Count.file
+    path.write_text(head + "0.5,0.5,2\n1,1,2\n1.5,1.5,2\n1.7,1.")
+    assert Count.read(Record(tmp_path))[0].tolist() == [0.5, 1, 1.5]
+    Count([]).truncate(path, 1.0)
+    assert path.read_text() == head + "0.5,0.5,2\n1,1,2\n"
+    assert [each.name for each in tmp_path.iterdir()] == [Count.file]
+    recorded(path, [2.0])
+    assert path.read_text() == head + "0.5,0.5,2\n1,1,2\n2,2,2\n"
+
+
+@pytest.mark.parametrize("torn", ["time [s],ti", "", None])
+def test_a_series_of_nothing(tmp_path, torn):
+    """With a head that was cut, which is written anew."""
+    path = tmp_path / Count.file
+    if torn is not None:
+        path.write_text(torn)
+        assert Count.read(Record(tmp_path))[1].shape == (1, 0)
+        Count([]).truncate(path, 1.0)
+    assert Count.read(Record(tmp_path))[0].shape == (0,)
+    recorded(path, [2.0])
+    assert path.read_text() == "time [s],time again [s],two [-]\n2,2,2\n"
+
+
+def test_depths_in_space_are_those_of_a_lattice():
+    case = cases.DamBreak(resolution=12, dimensions=3, width=0.5)
+    position = case.particles()["position"]
+    spacing = case.particle_spacing
+    gauges = [[0.0, 0.0], [0.3, 0.2], [0.9, 0.5], [1.0, 0.25]]
+    levels = Levels(gauges, [case.tank_length, case.width], spacing)
+    assert levels.depth(position) == pytest.approx(1, rel=1e-12)
+    assert levels.columns[1:3] == ["depth at x = 0 H; y = 0 H [H]", "depth at x = 0.3 H; y = 0.2 H [H]"]
+    upper = position[:, 1] > 0.25
+    half = Levels([[0.9, 0.0], [0.9, 0.5], [0.9, 0.25]], [case.tank_length, case.width], spacing)
+    across = position[~upper | (position[:, 2] < 0.5)]  # half as deep along the one side
+    assert across.shape != position.shape
+    low, high, middle = half.depth(across)
+    assert high == pytest.approx(0.5, abs=0.1) and low == pytest.approx(1, abs=0.1) and high < middle < low
+
+
+@pytest.mark.parametrize(("gauges", "lengths"), [([0.1], [2, 1]), ([[0.1, 0.2]], 2)])
+def test_gauges_of_another_number_of_directions_are_refused(gauges, lengths):
+    with pytest.raises(ConfigError, match="along x and y"):
+        Levels(gauges, lengths, 0.1)
+    levels = Levels([0.1], 2.0, 0.1)
+    with pytest.raises(ConfigError, match="tank in 2-D"):
+        levels.depth(np.zeros((4, 3)))
+
+
+def water(depth=0.6, shift=0.0, seed=0):
+    """Particles of water in the corner at the right of the tank, disturbed by shares of Δx."""
+    cells = lattice(cell_centres(16, SPACING), cell_centres(round(depth / SPACING), SPACING))
+    cells[:, 0] = 2 - cells[:, 0]
+    return cells + np.random.default_rng(seed).uniform(-shift, shift, cells.shape) * SPACING
+
+
+@pytest.mark.parametrize("shift", [0, 0.2])
+def test_pressure_on_walls_is_exact_for_what_is_quadratic_and_has_no_slope_across_them(shift):
+    def field(r):
+        return 2 - r[:, 1] - 3 * (r[:, 0] - 2) ** 2 - 2 * r[:, 1] ** 2
+
+    position, points = water(shift=shift), np.array([[2, 0.0], [2, 0.01], [2, 0.3], [1.6, 0], [1.99, 0.1]])
+    found = pressure_on_walls(position, field(position), points, SPACING, TANK, DOWN)
+    assert found == pytest.approx(field(points), abs=1e-10)
+
+
+def test_pressure_on_walls_of_spray_is_none_beyond_it_and_makes_little_of_little():
+    """Of two particles that differ by 2 no more than a quarter of that beyond them."""
+    drop = np.array([[1.98, 0.5], [1.98, 0.53]])
+    points = np.array([[2, 0.46], [2, 0.515], [2, 0.54], [2, 0.56], [2, 0.6], [2, 0.7], [0, 0.5]])
+    found = pressure_on_walls(drop, np.array([1.0, 3.0]), points, SPACING, TANK, np.zeros(2))
+    assert (found[:5] > 0.5).all() and (found[:5] < 3.5).all() and np.isnan(found[5:]).all()
+
+
+@pytest.mark.parametrize(("height", "felt"), [(0.1, 0.5), (0.55, 0.05), (0.6, 0.0), (0.9, 0.0)])
+def test_a_sensor_feels_water_where_it_is_wet_and_air_where_it_is_dry(height, felt):
+    """At the surface half of it, and nothing below the pressure of the air."""
+    case = cases.StillWater(resolution=20, length=2)
+    simulation = case.simulation(threads=1)
+    state = simulation.state()
+    kept = state["position"][:, 1] < 0.6
+    position = state["position"][kept]
+    arrays = {name: value[kept] for name, value in state.items() if np.shape(value)[:1] == kept.shape}
+    simulation.restore(state | arrays | {"pressure": np.maximum(0.6 - position[:, 1], 0)})
+    heights = height + np.linspace(-0.02, 0.02, 5)
+    sensors = Sensors({"one": np.stack([np.full(5, 2.0), heights], axis=1)}, SPACING)
+    (found,) = sensors.values(simulation)
+    assert found == pytest.approx(np.maximum(0.6 - heights, 0).mean(), abs=1e-9) == pytest.approx(felt, abs=0.007)
+
+
+def test_a_sensor_in_a_tank_that_sways_feels_what_pushes_the_water():
+    """A pressure that balances gravity and the sway, also at the wall, where it has a slope."""
+    case = cases.Sloshing(resolution=20, amplitude=0.5)
+    simulation = case.simulation(threads=1)
+    state, push = simulation.state(), np.array(case.forcing(None, 0.0))
+    position = state["position"]
+    simulation.restore(state | {"pressure": 3 + position @ (push - [0, 1])})
+    at = np.array([[0.0, 0.3], [0.0, 0.32]])
+    (found,) = Sensors({"one": at}, SPACING).values(simulation)
+    assert abs(push[0]) > 0.5 and found == pytest.approx(3 - 0.31, abs=1e-9)
+
+
+def test_discs_are_of_their_size():
+    """The mean over one is that over a disc: of y² about its middle d²/16."""
+    for case in (cases.DamBreak(resolution=40), cases.DamBreak(resolution=80, dimensions=3)):
+        points = case.disc(0.3, 0.15)
+        up = points[:, -1] - 0.3
+        assert points.shape[1] == case.dimensions and (points[:, 0] == case.tank_length).all()
+        assert np.mean(up**2) == pytest.approx(0.15**2 / 16, rel=0.05) and abs(up.mean()) < 1e-12
+        spaced = np.diff(np.unique(np.round(up, 9)))
+        assert spaced.max() <= case.particle_spacing / 2 + 1e-9
+    assert np.allclose(points[:, 1].mean(), 0.25) and points[:, 1].max() < 0.325
+
+
+@pytest.fixture(scope="module")
+def broken(tmp_path_factory):
+    """A dam break past its fall back, and the same cut and gone on with."""
+    path, case = tmp_path_factory.mktemp("runs"), cases.DamBreak(resolution=10)
+    case.run(path / "cut", until=1.0, progress=False)
+    alsph.resume(path / "cut", until=7.05, progress=False)
+    return case.run(path / "whole", until=7.05, progress=False)
+
+
+def test_front_and_sensors_of_a_run_that_is_cut_are_those_of_a_whole_one(broken):
+    for file in (Front.file, Sensors.file):
+        texts = [(broken.path.with_name(name) / file).read_text() for name in ("whole", "cut")]
+        assert texts[0] == texts[1]
+    head, first, *_ = texts[0].splitlines()
+    assert head == "time [√(H/g)],P1 [ρgH],P3 [ρgH],P4 [ρgH],Buchner's disc [ρgH]"
+    assert len(first.split(",")) == 5
+
+
+def test_the_front_is_recorded_finely_and_judged_at_its_times(broken):
+    time, front = Front.read(broken)
+    assert len(time) > 200 and np.diff(time).max() < 0.05 and len(broken.times) == 9
+    measures = {measure.name: measure for measure in broken.measures}
+    assert measures["front at t = 1, H"].value == pytest.approx(np.interp(1, time, front[0]))
+    assert broken.profiles[0].computed[0] == pytest.approx(time)
+    assert (np.diff(front[0]) > -0.05).all() and front[0].max() == broken.config.case.tank_length
+
+
+def test_impulses_stand_beside_those_of_the_experiments(broken):
+    time, pressure = Sensors.read(broken)
+    assert (pressure >= 0).all() and not pressure[:, time < 2].any() and pressure[:, time > 4].any(axis=1).all()
+    measures = {measure.name: measure for measure in broken.measures}
+    for (name, sensor), own in zip(SENSORS.items(), pressure, strict=True):
+        for window in WINDOWS:
+            measure = measures[impulse_name(name, window)]
+            inside = (time >= window[0]) & (time <= window[1])
+            mean = np.average(own[inside], weights=np.gradient(time[inside]))
+            assert measure.value == pytest.approx(mean * (window[1] - window[0]), rel=0.05)
+            assert (measure.tolerance, measure.source) == (0.15, sensor.source)
+    known = [measures[impulse_name("P1", window)].reference for window in WINDOWS]
+    assert known == pytest.approx([1.28, 1.19, 1.10], abs=0.005)
+    assert [profile.name for profile in broken.profiles[1:]] == [f"pressure at {name}" for name in SENSORS]
+
+
+def test_the_weight_of_the_water_at_last_is_felt_by_the_sensors(broken):
+    """At rest the pressure at the lowest sensor is the depth above it; it is still sloshing."""
+    time, pressure = Sensors.read(broken)
+    late = time > 6.5
+    assert pressure[0, late].mean() > pressure[1, late].mean() > pressure[2, late].mean() > 0
+
+
+def test_curves_of_the_experiments_run_forward_in_time():
+    for sensor in SENSORS.values():
+        time, pressure = sensor.measured()
+        assert (np.diff(time) >= 0).all() and time[0] < 0.3 and time[-1] > WINDOWS[-1][1] - 0.1
+        assert len(pressure) == len(reference.table(f"dam_break_pressure_{sensor.curve}.csv")[0])
+
+
+def test_a_sensor_that_the_water_has_not_met_is_not_drawn(tmp_path):
+    run = cases.DamBreak(resolution=8).run(tmp_path / "run", until=0.2, progress=False)
+    assert [profile.name for profile in run.profiles] == ["front"] and Sensors.read(run)[1].shape[0] == 4
+
+
+def test_other_columns_and_tanks_have_no_experiment(tmp_path):
+    run = cases.DamBreak(resolution=8, length=1.0, tank_length=2.0).run(tmp_path / "run", until=4.0, progress=False)
+    assert [measure.name for measure in run.measures] == ["largest rise of the energy over its start"]
+    assert all(not profile.reference[0].size for profile in run.profiles) and len(run.profiles) == 5
+
+
+def test_probes_at_walls_do_not_read_below_the_air(tmp_path):
+    """Where the pressure grows away from a wall, and the fit goes on below zero in the half spacing before it."""
+    case = cases.StillWater(resolution=12)
+    simulation = case.simulation(threads=1)
+    state = simulation.state()
+    steep = 10 * (state["position"][:, 0] - case.particle_spacing / 2)
+    simulation.restore(state | {"pressure": np.maximum(steep, 0)})
+    at = np.array([[0, 0.5], [0.02, 0.5], [0.5, 0.5], [9, 9]])
+    found = simulation.sample(at)["pressure"]
+    assert found[:2].tolist() == [0, 0] and found[2] == pytest.approx(4.58, abs=0.01) and np.isnan(found[3])
+    arrays = simulation.snapshot()
+    snapshot = Snapshot(**{each.name: arrays[each.name] for each in fields(Snapshot) if each.name in arrays})
+    sampled = sampling.at(snapshot, at[:3], case.particle_spacing, case.checked_domain)["pressure"]
+    assert sampled[:2].tolist() == [0, 0] and sampled[2] == pytest.approx(4.58, abs=0.01)
+
+
+def test_a_fluid_in_tension_reads_below_the_air(tmp_path):
+    run = cases.RotatingPatch(resolution=12).run(tmp_path / "patch", until=0.2, probes="0,0", progress=False)
+    assert run.probes.pressure.max() < -0.05 and run.sample([[0, 0]])["pressure"] < -0.05
+
+
+def test_a_folder_that_is_replaced_keeps_no_old_figure_of_water(alsph, tmp_path):
+    run = tmp_path / "run"
+    assert alsph("run", "dam_break", "--resolution=8", "--until=0.1", "-o", run)[0] == 0
+    assert f"{run / 'figures' / 'front.png'}" in alsph("plot", run)[1]
+    (run / "figures" / "pressure_at_buchner_s_disc.png").touch()
+    assert alsph("run", "still_water", "--resolution=8", "--until=0.1", "--force", "-o", run)[0] == 0
+    assert not (run / "figures").exists() and not [*run.glob("output_*")]
+
+
+def test_a_probe_outside_is_refused_in_the_names_of_the_case():
+    with pytest.raises(ConfigError, match=r"lies outside of the domain, .* \[H\]"):
+        _ = Config(cases.StillWater(), RunSettings(probes="5,5")).probes
+
+
+def test_a_width_without_a_third_dimension_is_refused(alsph):
+    with pytest.raises(ConfigError, match="width = 0.4: of a tank in 3-D; give dimensions = 3, too"):
+        cases.DamBreak(width=0.4)
+    assert cases.DamBreak(width=0.5) == cases.DamBreak()
+    assert cases.DamBreak(width=0.4, dimensions=3, resolution=10).width == 0.4
+    code, _, complaint = alsph("run", "dam_break", "--width", "0.4")
+    assert code == 2 and "width = 0.4: of a tank in 3-D" in complaint
