@@ -37,13 +37,13 @@ const CHEBYSHEV_SPAN: f64 = 0.2;
 const CHEBYSHEV_DEGREE: usize = 4;
 
 /// What disordered particles may add to the largest eigenvalue of the lattice.
-pub(super) const EIGENVALUE_MARGIN: f64 = 1.1;
+const EIGENVALUE_MARGIN: f64 = 1.1;
 
 /// What the sweeps are multiplied with, lengths squared.
 #[derive(Clone, Copy, Debug)]
 pub struct Sweeps {
     /// σ.
-    relaxation: f64,
+    pub(super) relaxation: f64,
     /// One over the largest eigenvalue of the compact Laplacian: so much of it takes the shortest waves off.
     shortest: f64,
     /// Whether there are any.

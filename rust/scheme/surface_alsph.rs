@@ -20,7 +20,7 @@ use crate::discretisation::{AdjointGradient, ConservativeGradient, Divergence, L
 use crate::flow::{Flow, Step};
 use crate::frame::Frame;
 use crate::particles::{ParticleKind, Particles};
-use crate::scheme::projection::{EIGENVALUE_MARGIN, weight};
+use crate::scheme::projection::{Sweeps, weight};
 use crate::scheme::{Derived, Scheme, Solved};
 use crate::settings::{Eigenvalues, FreeSurface, PressureGradient, Settings, TimeStepLimits};
 use crate::surface::{Place, Surface};
@@ -34,6 +34,7 @@ const BESIDE: f64 = 1.2;
 pub struct SurfaceAlsph<const D: usize> {
     own: FreeSurface,
     largest: Eigenvalues,
+    sweeps: Sweeps,
     /// r_AL of the step.
     penalty: f64,
     undisturbed: f64,
@@ -55,9 +56,11 @@ pub struct SurfaceAlsph<const D: usize> {
 
 impl<const D: usize> SurfaceAlsph<D> {
     pub fn new(settings: &Settings, own: FreeSurface) -> Self {
+        let largest = settings.largest_eigenvalues();
         Self {
             own,
-            largest: settings.largest_eigenvalues(),
+            largest,
+            sweeps: Sweeps::new(settings, largest),
             penalty: f64::NAN,
             undisturbed: settings.undisturbed_volume(),
             derived: Vec::new(),
@@ -289,10 +292,8 @@ impl<const D: usize> SurfaceAlsph<D> {
     }
 
     fn sweep(&mut self, step: Step, flow: &mut Flow<D>) {
-        let area = step.settings.particle_spacing.powi(2);
-        let relaxation = area / (EIGENVALUE_MARGIN * self.largest.projection);
         for sweep in 0..step.settings.projection_sweeps {
-            let relaxation = relaxation / weight(step.settings, sweep);
+            let relaxation = self.sweeps.relaxation / weight(step.settings, sweep);
             let factor = step.settings.density * relaxation / step.time_step;
             self.measure_divergence(step, flow);
             self.form_tensor(step.settings, flow);
@@ -406,5 +407,9 @@ impl<const D: usize> Scheme<D> for SurfaceAlsph<D> {
 
     fn penalty(&self, _: f64) -> f64 {
         self.penalty
+    }
+
+    fn reach(&self, time_step: f64) -> f64 {
+        (self.penalty * time_step + self.sweeps.reach_squared()).sqrt()
     }
 }

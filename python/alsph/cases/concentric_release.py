@@ -20,6 +20,7 @@ from alsph.geometry.particles import Kind, join, particles
 from alsph.geometry.rigid import Rigid
 from alsph.geometry.solids import cylinder_rings
 from alsph.geometry.volume import Volume
+from alsph.symbols import Symbols
 
 RADIUS = 0.5
 
@@ -39,8 +40,9 @@ class ConcentricRelease(Case):
     name: ClassVar[str] = "concentric_release"
     title: ClassVar[str] = "release of a cylinder in a round vessel"
     settles: ClassVar[bool] = False
+    symbols: ClassVar[Symbols] = Symbols("D", "√(gD)", "√(D/g)", "√(g/D)", "g", "ρgD", "t√(g/D)")
 
-    reynolds: float = Field(default=1e4, gt=0, description="Reynolds number UD/ν, U = √(gD) [-]")
+    reynolds: float = Field(default=1e4, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, ge=8, description="particles across the cylinder, D/Δx [-]")
     density_ratio: float = Field(default=2.0, gt=0, description="density of the cylinder over that of the fluid [-]")
     vessel: float = Field(default=2.0, gt=1.3, description="diameter of the vessel [D]")

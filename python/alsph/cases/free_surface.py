@@ -139,7 +139,7 @@ class FreeSurface(Case):
 
     In cases with gravity D is H, the depth of the fluid, U = √(gH) and g = 1, hence times in √(H/g). A step is that of
     ALSPH with operators that keep momentum and energy where a particle has no neighbours (docs/free_surface.md); the
-    other schemes, bodies, inlets and outlets are not there yet.
+    other schemes, inlets and outlets are not there yet.
     """
 
     symbols: ClassVar[Symbols] = WATER
@@ -177,10 +177,11 @@ class FreeSurface(Case):
         default="equal", description="how far each projection sweep goes"
     )
     sweep_pressure: Literal["rough"] = Field(default="rough", description="what the pressure keeps of the sweeps")
-    pressure_gradient: Literal["adjoint", "conservative"] = Field(
-        default="adjoint",
+    pressure_gradient: Literal["adjoint", "conservative"] | None = Field(
+        default=None,
         description="pressure gradient: minus the adjoint of the divergence, nearer in waves, or the plain sum over "
-        "pairs, which keeps angular momentum, too",
+        "pairs, which keeps angular momentum, too, and rest beside bodies; by default the one without bodies, the "
+        "other with them",
     )
     packing_relaxation: float = Field(
         default=0.0, ge=0, le=1, description="share of a number density above the lattice's that a step takes off [-]"
@@ -216,7 +217,7 @@ class FreeSurface(Case):
         return super().settings() | {
             "free_surface": {
                 "reference_velocity": self.reference_velocity,
-                "pressure_gradient": self.pressure_gradient,
+                "pressure_gradient": self.pressure_gradient or ("conservative" if self.checked_bodies else "adjoint"),
                 "tension": self.tension,
                 "packing_relaxation": self.packing_relaxation,
             }

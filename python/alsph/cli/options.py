@@ -117,6 +117,7 @@ def idle(model: type[cases.Case], case: cases.Case | None) -> set[str]:
         acts = {
             "wall_velocity": bodies,
             "wall_pressure": bodies,
+            "body_motion": case.moved_bodies,
             "surface_velocity": [body for body in bodies if not body.moves],
             "inlet_velocity": [*domain.inlets()],
             "surface_interval": case.surface_points(),
