@@ -131,8 +131,6 @@ pub struct Motion<const D: usize> {
     members: Vec<(usize, usize)>,
     /// Lengths of the domain's periodic directions; zero of others.
     period: Vector<D>,
-    /// Whether free bodies go on from poses that were set.
-    goes_on: bool,
 }
 
 #[derive(Debug)]
@@ -165,7 +163,7 @@ struct Shape<const D: usize> {
 impl<const D: usize> Default for Motion<D> {
     fn default() -> Self {
         let (bodies, place_of, shape, members) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { bodies, place_of, shape, members, period: Vector::zeros(), goes_on: false }
+        Self { bodies, place_of, shape, members, period: Vector::zeros() }
     }
 }
 
@@ -212,17 +210,18 @@ impl<const D: usize> Motion<D> {
 
     /// Go on with free bodies in such `poses`, one for each of the settings' bodies.
     pub fn set_poses(&mut self, poses: &[Pose]) {
-        self.goes_on = true;
         self.bodies.iter_mut().for_each(|body| body.start = poses[body.body as usize]);
     }
 
-    /// Be ready for a step at `time`: the first time, take the shape of the bodies from the particles, and give these their velocities.
+    /// Be ready for a step at `time`: the first time, take the shape of the bodies from the particles, and give these their velocities. In the
+    /// first step of all, free bodies have no acceleration yet.
     pub fn start(
         &mut self,
         settings: &Settings,
         particles: &mut Particles<D>,
         rule: &mut Option<MotionRule>,
         time: f64,
+        is_first: bool,
     ) -> Result<()> {
         if self.is_none() || !self.shape.is_empty() {
             return Ok(());
@@ -249,7 +248,7 @@ impl<const D: usize> Motion<D> {
             body.layer_inertia += mass * spatial(&shape.arm).cross(&spatial(&shape.normal)).norm_squared();
         }
         for body in &mut self.bodies {
-            if let Some(rigid) = body.rigid.as_ref().filter(|_| !self.goes_on) {
+            if let Some(rigid) = body.rigid.as_ref().filter(|_| is_first) {
                 // The fluid at rest answers to the first acceleration with the mass that it takes along.
                 let at_once = [rigid.added_mass, rigid.added_inertia];
                 body.start.respond::<D>(rigid, at_once, &settings.body_force, Vector3::zeros(), Vector3::zeros());

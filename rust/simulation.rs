@@ -164,7 +164,8 @@ impl<const D: usize> Simulation<D> {
     /// One time step: the stages of the method in order.
     fn step(&mut self) -> Result<()> {
         let Flow { particles, motion, .. } = &mut self.flow;
-        motion.start(&self.settings, particles, &mut self.forcing.motion, self.clock.time)?;
+        let is_first = self.clock.step == 0;
+        motion.start(&self.settings, particles, &mut self.forcing.motion, self.clock.time, is_first)?;
         let velocity_max = self.velocity_max();
         let time_step = self.time_step(velocity_max)?;
         let fraction = self.settings.derivative_frame.fraction();

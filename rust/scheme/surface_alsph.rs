@@ -132,7 +132,7 @@ impl<const D: usize> SurfaceAlsph<D> {
             &mut self.derived,
             |i, value, derived| {
                 // What a wall does to the stress solids do not tell.
-                let is_free = frame.stencil.neighbours.row(i).0.solid().is_empty();
+                let is_free = frame.stencil.solids_near(step.settings, i).next().is_none();
                 if surface.place[i].sees_air() && is_free {
                     derived.laplacian = value;
                 }

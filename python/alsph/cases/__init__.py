@@ -28,7 +28,9 @@ from alsph.cases.couette import Couette
 from alsph.cases.cylinder import Cylinder
 from alsph.cases.cylinder_pair import CylinderPair
 from alsph.cases.dam_break import DamBreak
+from alsph.cases.dam_break_obstacle import DamBreakObstacle
 from alsph.cases.elliptical_drop import EllipticalDrop
+from alsph.cases.floating_box import FloatingBox
 from alsph.cases.free_surface import FreeSurface
 from alsph.cases.moving_cylinder import MovingCylinder
 from alsph.cases.nozzle import Nozzle
@@ -57,7 +59,7 @@ CASES: dict[str, type[Case]] = {
         *(Cylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Nozzle, Bend, Cavity),
         *(Poiseuille, Couette, TaylorCouette, PulsatingChannel, Pipe, PressureJump, TaylorGreen),
         *(OscillatingCylinder, TowedCylinder, ConcentricRelease, SettlingSphere),
-        *(DamBreak, StandingWave, StillWater, Sloshing, EllipticalDrop, RotatingPatch),
+        *(DamBreak, DamBreakObstacle, StandingWave, StillWater, Sloshing, FloatingBox, EllipticalDrop, RotatingPatch),
     )
 }
 
@@ -74,10 +76,12 @@ __all__ = [
     "ConcentricRelease",
     "Couette",
     "DamBreak",
+    "DamBreakObstacle",
     "Cylinder",
     "CylinderPair",
     "Domain",
     "EllipticalDrop",
+    "FloatingBox",
     "FreeSurface",
     "MovingCylinder",
     "Nozzle",

@@ -157,17 +157,9 @@ class DamBreak(FreeSurface):
         if self.dimensions == 3:
             cells.insert(1, self.whole_cells("width", self.width))
         position = lattice(*(cell_centres(count, self.particle_spacing) for count in cells))
-        return self.fluid(position, np.zeros_like(position), self.first_pressure(position))
-
-    def first_pressure(self, position: FloatArray) -> FloatArray:
-        """Return the pressure (n,) of an inviscid column just let go [ρgH]: ∇²p = 0, 0 at its top and its free side.
-
-        That is 1 − y less what the free side takes off, a Fourier series.
-        """
-        x, y = position[:, 0], position[:, -1]
-        wave, end = np.pi * TERMS[:, None] / 2, self.length
-        along = (np.exp(wave * (x - end)) + np.exp(-wave * (x + end))) / (1 + np.exp(-2 * wave * end))
-        return np.asarray(1 - y - (2 / wave**2 * np.cos(wave * y) * along).sum(axis=0))
+        return self.fluid(
+            position, np.zeros_like(position), column_pressure(position[:, 0], position[:, -1], self.length)
+        )
 
     def front(self, position: FloatArray) -> float:
         """Return how far the water has come [H]: half a spacing before its third foremost particle, or to the wall."""
@@ -233,3 +225,13 @@ def _impulse(curve: tuple[FloatArray, FloatArray], window: tuple[float, float]) 
     at = np.array([window[0], *time[(time > window[0]) & (time < window[1])], window[1]])
     pressure = np.interp(at, *curve)
     return float((np.diff(at) * (pressure[1:] + pressure[:-1])).sum() / 2)
+
+
+def column_pressure(x: FloatArray, y: FloatArray, length: float) -> FloatArray:
+    """Return the pressure (n,) of an inviscid column just let go [ρgH]: ∇²p = 0, 0 at its top and its free side.
+
+    That is 1 − y less what the free side takes off, a Fourier series.
+    """
+    wave = np.pi * TERMS[:, None] / 2
+    along = (np.exp(wave * (x - length)) + np.exp(-wave * (x + length))) / (1 + np.exp(-2 * wave * length))
+    return np.asarray(1 - y - (2 / wave**2 * np.cos(wave * y) * along).sum(axis=0))

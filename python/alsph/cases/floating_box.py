@@ -1,0 +1,144 @@
+"""A box that floats in a tank."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from alsph.analysis.measures import Measure, Profile
+from alsph.analysis.record import Record
+from alsph.cases.free_surface import FreeSurface
+from alsph.errors import ConfigError
+from alsph.geometry.domain import Domain, SolidBody
+from alsph.geometry.lattice import cell_centres, inside, lattice
+from alsph.geometry.particles import join
+from alsph.geometry.rigid import Rigid
+from alsph.geometry.solids import body_layers
+
+SHOWN = 2.0
+"""Time from which on the force on the box is compared with its weight [√(H/g)]."""
+
+
+class FloatingBox(FreeSurface):
+    """A box that floats in a tank with slip walls, free to move and to turn; let go above its draught it heaves.
+
+    The tank is filled to the depth H but for the box's part below the water; sizes of the box are taken to whole
+    spacings, and its density so that its draught is. At rest it displaces its weight (Archimedes).
+    """
+
+    name: ClassVar[str] = "floating_box"
+    title: ClassVar[str] = "a box that floats in a tank"
+    later_names: ClassVar[tuple[str, ...]] = (*FreeSurface.later_names, "mean force", "turn", "heave")
+
+    tank_length: float = Field(default=3.0, gt=0, description="length of the tank [H]")
+    tank_height: float = Field(default=2.0, gt=1, description="height above which spray is lost [H]")
+    box_length: float = Field(default=0.6, gt=0, description="length of the box [H]")
+    box_height: float = Field(default=0.4, gt=0, description="height of the box [H]")
+    density_ratio: float = Field(default=0.5, gt=0, lt=1, description="density of the box over that of water [-]")
+    lift: float = Field(default=0.0, description="height above its draught that it is let go at [H]")
+
+    @model_validator(mode="after")
+    def _floats_inside(self) -> Self:
+        half = self.tank_length / 2
+        if self.size[0] / 2 > half - 4 * self.particle_spacing:
+            told = f"does not fit into a tank_length of {self.tank_length:g}"
+            raise ConfigError(f"box_length = {self.box_length:g}: {told}")
+        if not (self.bottom < 1 and 0 < self.draught < self.size[1]):
+            raise ConfigError(f"lift = {self.lift:g}: the box would not be in the water, or not float")
+        if self.bottom < 4 * self.particle_spacing:
+            raise ConfigError(f"box_height = {self.box_height:g}: the box would stand on the floor")
+        self.whole_cells("tank_length", self.tank_length)
+        return self
+
+    def _whole(self, length: float, count: int = 1) -> float:
+        """Return a length to a whole number of so many spacings [H]."""
+        return count * round(length / count * self.resolution) / self.resolution
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Length and height of the box, to whole spacings [H]."""
+        return self._whole(self.box_length, 2), self._whole(self.box_height)
+
+    @property
+    def draught(self) -> float:
+        """Depth that the box is immersed to at rest, to whole spacings [H]."""
+        return self._whole(self.density_ratio * self.size[1])
+
+    @property
+    def default_until(self) -> float:
+        """About two periods of heaving."""
+        return 8.0
+
+    @property
+    def bottom(self) -> float:
+        """Height of the box's bottom at the start [H]."""
+        return 1 - self.draught + self._whole(self.lift)
+
+    @property
+    def coefficient_bodies(self) -> list[str]:
+        """Name of the box."""
+        return ["box"]
+
+    def domain(self) -> Domain:
+        """Return the tank, whose top is open."""
+        half = self.tank_length / 2
+        return Domain((-half, 0), (half, self.tank_height), [("slip", "slip"), ("slip", "air")])
+
+    @property
+    def weight(self) -> float:
+        """That of the box [ρgH²]."""
+        return self.draught * self.size[0]
+
+    def bodies(self) -> list[SolidBody]:
+        """Return the box."""
+        inertia = self.weight * (self.size[0] ** 2 + self.size[1] ** 2) / 12
+        rigid = Rigid(self.weight, inertia, displaced=self.weight)
+        return [SolidBody("box", (0, self.bottom + self.size[1] / 2), rigid=rigid)]
+
+    @property
+    def initial_volume(self) -> float:
+        """That of the water [H²]."""
+        return self.tank_length - self.size[0] * (1 - self.bottom)
+
+    def particles(self) -> dict[str, NDArray[Any]]:
+        """Return water at rest around the box."""
+        (length, height), spacing = self.size, self.particle_spacing
+        box = shapely.box(-length / 2, self.bottom, length / 2, self.bottom + height)
+        columns = cell_centres(self.whole_cells("tank_length", self.tank_length), spacing) - self.tank_length / 2
+        position = lattice(columns, cell_centres(self.resolution, spacing))
+        position = position[~inside(box, position)]
+        water = self.fluid(position, np.zeros_like(position), 1 - position[:, 1])
+        return join(water, body_layers(box, spacing, self.support_layers).particles())
+
+    def measures(self, run: Record) -> list[Measure]:
+        """Return the mean force of the water on the box over its weight, the largest turn, and what energy was made."""
+        rows = []
+        time, force = run.history["time"], run.history.get("box_pressure_force_y", np.empty(0))
+        late = time > SHOWN
+        if late.any() and len(force):
+            mean = float(np.average(force[late], weights=run.history["time_step"][late]) / self.weight)
+            turn = float(np.abs(run.history["box_angle"]).max())
+            source = "Archimedes' principle"
+            rows = [
+                Measure(
+                    "mean force of the water over the weight", mean, 1.0 if self.lift == 0 else np.nan, 0.02, source
+                ),
+                Measure("turn of the box, rad", turn, 0.0, 0.02, "symmetry"),
+            ]
+        return rows + self.energy_measures(run)
+
+    def energy_measures(self, run: Record) -> list[Measure]:
+        """Return none: the box has energy, too."""
+        return []
+
+    def profiles(self, run: Record) -> list[Profile]:
+        """Return how far the box has risen over time."""
+        if "box_displacement_y" not in run.history:
+            return []
+        none = np.empty(0), np.empty(0)
+        axes = ("$t\\sqrt{g/H}$", "height of the box over that at the start, $/H$")
+        return [Profile("heave", axes, (run.history["time"], run.history["box_displacement_y"]), none, "")]
