@@ -3,10 +3,12 @@
 use alsph::base::Tensor;
 use alsph::discretisation::{AdjointGradient, ConservativeGradient, Divergence};
 use alsph::frame::{Frame, Travel};
+use alsph::motion::Pose;
 use alsph::settings::Settings;
 use alsph::surface::{Place, Surface};
-use alsph::{Clock, Matrix, Particles, Simulation, Vector};
+use alsph::{Clock, Matrix, ParticleKind, Particles, Simulation, Vector};
 use approx::assert_relative_eq;
+use nalgebra::Vector3;
 use proptest::prelude::*;
 use serde_json::json;
 
@@ -268,5 +270,143 @@ fn water_in_space_has_the_same_bits_on_two_threads_and_makes_no_energy() {
         }
         assert!(history.last().expect("steps").kinetic_energy > 0.01 * energy[0], "it does not fall");
         assert!(history.iter().all(|report| report.places[0] > 0), "no surface");
+    }
+}
+
+/// Water between slip walls over a floor of solids, on it a free body that floats, half in it one that swings as it is told: the same bits with
+/// all that is stale made NaN, cut, on two threads and stored in another order. With every rule of the walls, frame and gradient, in 2-D and 3-D.
+fn water_with_bodies<const D: usize>(walls: &str, frame: &str, gradient: &str, kinematic_viscosity: f64) {
+    let mut value = serde_json::to_value(settings::<D>("slip", gradient)).expect("JSON");
+    (value["wall_velocity"], value["derivative_frame"]) = (walls.into(), frame.into());
+    value["kinematic_viscosity"] = json!(kinematic_viscosity);
+    value["domain"]["upper"] = vec![1.2; D].into();
+    let mut sides = vec![["slip", "slip"]; D];
+    sides[D - 1] = ["none", "air"];
+    value["domain"]["boundaries"] = json!(sides);
+    let center = |x: f64, up: f64| {
+        Vector::<D>::from_fn(|axis, _| {
+            if axis == 0 {
+                x
+            } else if axis == D - 1 {
+                up
+            } else {
+                0.6
+            }
+        })
+    };
+    let places = [center(0.35, 0.85), center(0.9, 0.7)];
+    let turning = if D == 2 { 1 } else { 3 };
+    let rigid = json!({
+        "mass": 0.02, "inertia": if D == 2 { vec![1e-3] } else { vec![1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0, 0.0, 0.0, 1e-3] },
+        "force": vec![0.0; D], "stiffness": vec![0.0; D], "damping": vec![0.0; D], "free": vec![true; D + turning],
+        "added_mass": 0.02, "added_inertia": 1e-3,
+    });
+    value["bodies"] = json!([
+        {"name": "floor", "velocity": vec![0.0; D], "moves": false, "center": vec![0.0; D]},
+        {"name": "float", "velocity": null, "moves": true, "center": places[0].as_slice(), "rigid": rigid},
+        {"name": "paddle", "velocity": null, "moves": true, "center": places[1].as_slice()},
+    ]);
+    let settings = common::parse(&value);
+    let (side, deep) = (12, 4);
+    let mut particles = common::particles(Vec::new());
+    let cells = side * (side + deep) * if D == 3 { side } else { 1 };
+    for k in 0..cells {
+        let (x, rest) = (k % side, k / side);
+        let (across, up) = if D == 3 { (rest % side, rest / side) } else { (0, rest) };
+        let place = Vector::<D>::from_fn(|axis, _| {
+            let cell = if axis == 0 {
+                x as f64
+            } else if axis == D - 1 {
+                up as f64 - deep as f64
+            } else {
+                across as f64
+            };
+            (cell + 0.5) * SPACING
+        });
+        let within = |k: usize| 0.17 - (place - places[k]).norm();
+        let (kind, body, depth, normal) = match (0..2).find(|&k| within(k) > 0.0) {
+            _ if place[D - 1] < 0.0 => {
+                (ParticleKind::Solid, 0, -place[D - 1], Vector::from_fn(|axis, _| f64::from(axis == D - 1)))
+            }
+            Some(k) => (ParticleKind::Solid, k as u16 + 1, within(k), (place - places[k]).normalize()),
+            None if up - deep >= 8 => continue,
+            None => (ParticleKind::Fluid, 0, 0.0, Vector::zeros()),
+        };
+        particles.position.push(place);
+        particles.velocity.push(Vector::zeros());
+        particles.pressure.push(if kind == ParticleKind::Fluid { 0.8 - place[D - 1] } else { 0.0 });
+        particles.kind.push(kind);
+        particles.body.push(body);
+        particles.depth.push(depth);
+        particles.normal.push(normal);
+        particles.id.push(k as u64);
+    }
+    particles.real = particles.position.len();
+    let start = |particles: Particles<D>, clock, threads, poison| {
+        let mut simulation = Simulation::new(settings.clone(), particles, clock, Some(threads)).expect("settings");
+        simulation.poison(poison);
+        simulation.forcing.motion = Some(Box::new(|time: f64| {
+            let (sin, cos) = (6.0 * time).sin_cos();
+            let displacement = Vector3::x() * (0.05 * sin);
+            let velocity = Vector3::x() * (0.3 * cos);
+            Ok(vec![Pose { displacement, velocity, acceleration: Vector3::x() * (-1.8 * sin), ..Pose::default() }])
+        }));
+        simulation
+    };
+    let mut whole = start(particles.clone(), Clock::default(), 1, false);
+    whole.advance(12, None).expect("steps");
+    let mut first = start(particles, Clock::default(), 2, true);
+    first.advance(5, None).expect("steps");
+    let (mut saved, poses) = (first.particles().clone(), first.poses());
+    saved.drop_images();
+    let order: Vec<u32> = (0..saved.real as u32).rev().collect();
+    saved.reorder(&order);
+    let mut second = start(saved, first.clock(), 2, true);
+    second.set_poses(&poses).expect("poses");
+    second.advance(7, None).expect("steps");
+    let state = |simulation: &Simulation<D>| {
+        let particles = simulation.particles();
+        let mut order: Vec<_> = (0..particles.real).collect();
+        order.sort_by_key(|&i| particles.id[i]);
+        order.into_iter().map(|i| (particles.position[i], particles.velocity[i], particles.pressure[i])).collect::<Vec<_>>()
+    };
+    assert!(state(&whole) == state(&second), "{walls} {frame} {gradient} {D}");
+    assert_eq!(whole.poses(), second.poses());
+    assert!(whole.poses()[1].displacement.norm() > 0.0 && whole.poses()[2].displacement.x > 0.0);
+}
+
+#[test]
+fn water_with_bodies_has_the_same_bits_however_it_is_computed() {
+    for (walls, gradient) in [("adami", "conservative"), ("morris", "adjoint"), ("paper", "conservative")] {
+        for (frame, viscosity) in [("midpoint", 1e-3), ("initial", 1e-6)] {
+            water_with_bodies::<2>(walls, frame, gradient, viscosity);
+        }
+    }
+    water_with_bodies::<3>("adami", "midpoint", "conservative", 1e-3);
+    water_with_bodies::<3>("morris", "midpoint", "adjoint", 1e-6);
+}
+
+/// Solids show what mirrors do: a column over a floor of solids presses on it with its weight, as over a slip wall.
+#[test]
+fn solids_beside_a_surface_carry_the_weight() {
+    let mut value = serde_json::to_value(settings::<2>("slip", "conservative")).expect("JSON");
+    value["wall_velocity"] = "adami".into();
+    value["domain"] = json!({"lower": [0.0, 0.0], "upper": [2.0, 2.0], "boundaries": [["slip", "slip"], ["none", "air"]]});
+    value["bodies"] = json!([{"name": "floor", "velocity": [0.0, 0.0], "moves": false, "center": [0.0, 0.0]}]);
+    let mut particles = fluid(block([0.0, -0.4], [20, 14], 0.0, 0), |_| Vector::zeros());
+    for i in 0..particles.real {
+        let height = particles.position[i][1];
+        if height < 0.0 {
+            (particles.kind[i], particles.depth[i]) = (ParticleKind::Solid, -height);
+            particles.normal[i] = Vector::from([0.0, 1.0]);
+        } else {
+            particles.pressure[i] = 1.0 - height;
+        }
+    }
+    let mut simulation = Simulation::new(common::parse(&value), particles, Clock::default(), Some(2)).expect("settings");
+    simulation.advance(60, None).expect("steps");
+    for report in simulation.take_history() {
+        assert_relative_eq!(report.loads[0].pressure_force[1], -2.0, max_relative = 0.02);
+        assert!(report.loads[0].pressure_force[0].abs() < 1e-3 && report.kinetic_energy < 1e-4, "{report:?}");
     }
 }
