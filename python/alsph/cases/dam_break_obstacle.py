@@ -122,6 +122,10 @@ class DamBreakObstacle(FreeSurface):
         """That of half of the column [H³]."""
         return float(COLUMN * TANK[1])
 
+    def particle_estimate(self) -> int:
+        """Return about how many particles there are, with those of the box."""
+        return super().particle_estimate() + len(self._solid.position)
+
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return the column at rest with the pressure of its first instant, and the box."""
         counts = np.rint([COLUMN * self.resolution, TANK[1] * self.resolution, self.resolution]).astype(int)

@@ -104,6 +104,12 @@ class FloatingBox(FreeSurface):
         """That of the water [H²]."""
         return self.tank_length - self.size[0] * (1 - self.bottom)
 
+    def particle_estimate(self) -> int:
+        """Return about how many particles there are, with those of the box."""
+        hollow = [max(0.0, side - 2 * self.support_layers * self.particle_spacing) for side in self.size]
+        box = self.size[0] * self.size[1] - hollow[0] * hollow[1]
+        return super().particle_estimate() + round(box * self.resolution**2)
+
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return water at rest around the box."""
         (length, height), spacing = self.size, self.particle_spacing

@@ -94,6 +94,7 @@ QUICK = (
     Entry("dam_break", (20, 40), until=2.0),
     Entry("standing_wave", (20, 30), until=10.0),
     Entry("elliptical_drop", (10, 20), until=0.8),
+    Entry("floating_box", (20,), until=5.0),
     Entry("concentric_release", (10, 20), until=0.11, parameters={"density_ratio": 0.5}),
 )
 FULL = (
@@ -110,6 +111,8 @@ FULL = (
     Entry("concentric_release", (10, 20, 40), until=0.11, parameters={"density_ratio": 2.0}),
     Entry("oscillating_cylinder", (10, 20), until=15.0),
     Entry("dam_break", (20, 40, 80), until=2.0),
+    Entry("dam_break_obstacle", (20,), until=6.0),
+    Entry("floating_box", (20, 40), until=8.0),
     Entry("still_water", (20, 40), until=10.0),
     Entry("standing_wave", (20, 40), until=10.0, parameters={"reynolds": 50}),
     Entry("standing_wave", (20, 40), until=10.0),
