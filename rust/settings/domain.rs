@@ -125,10 +125,8 @@ pub(super) fn validate_bodies(bodies: &[Body], dimensions: usize) -> Result<()> 
         if bodies[..k].iter().any(|other| other.name == body.name) {
             return Err(setting("bodies", format!("two are named \"{}\"; names must differ", body.name)));
         }
-        let name = format!("bodies.{}.velocity", body.name);
-        match &body.velocity {
-            Some(velocity) => validate_vector(&name, velocity, dimensions)?,
-            None => {}
+        if let Some(velocity) = &body.velocity {
+            validate_vector(&format!("bodies.{}.velocity", body.name), velocity, dimensions)?;
         }
         validate_vector(&format!("bodies.{}.center", body.name), &body.center, dimensions)?;
         if let Some(rigid) = &body.rigid {
