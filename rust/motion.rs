@@ -247,9 +247,10 @@ impl<const D: usize> Motion<D> {
             body.layer += mass;
             body.layer_inertia += mass * spatial(&shape.arm).cross(&spatial(&shape.normal)).norm_squared();
         }
+        // A fluid at rest that has no pressure yet answers to the first acceleration with the mass that it takes along.
+        let begins = is_first && particles.pressure[..particles.real].iter().all(|&p| p == 0.0);
         for body in &mut self.bodies {
-            if let Some(rigid) = body.rigid.as_ref().filter(|_| is_first) {
-                // The fluid at rest answers to the first acceleration with the mass that it takes along.
+            if let Some(rigid) = body.rigid.as_ref().filter(|_| begins) {
                 let at_once = [rigid.added_mass, rigid.added_inertia];
                 body.start.respond::<D>(rigid, at_once, &settings.body_force, Vector3::zeros(), Vector3::zeros());
                 body.start.follow(1.0);
