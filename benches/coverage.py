@@ -1,4 +1,4 @@
-"""How often the ± of the mean drag covers the settled drag, on signals where that is known.
+"""How often the ± of the mean drag covers the settled drag, on signals where that is known, also of runs that it ends.
 
 python benches/coverage.py --seeds 200
 """
@@ -10,20 +10,23 @@ from pathlib import Path
 import numpy as np
 from alsph.analysis import averages
 from alsph.analysis.uncertainty import uncertainty_of_mean
+from alsph.cases import Cylinder
+from alsph.config import Config, RunSettings
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
-from battery import DEVELOPING, ESTIMATED, SETTLED, autoregressive_series, times  # noqa: E402
+from battery import DEVELOPING, ENDED, ESTIMATED, SETTLED, autoregressive_series, judgements, times  # noqa: E402
 
 CORRELATIONS = (0.0, 0.5, 0.7, 0.9)
 
 
 def main() -> None:
-    """Print both tables."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=100)
     seeds = parser.parse_args().seeds
     independent(5 * seeds)
     records(seeds)
+    converged(seeds)
 
 
 def independent(trials: int) -> None:
@@ -63,6 +66,25 @@ def records(seeds: int) -> None:
         print(
             f"| {name} | {np.median(periods):.0f} | {one:.2f} | {two:.2f} | {np.mean(~known):.2f} "
             f"| {developing.mean():.2f} | {np.median(uncertainty):.4f} | {np.sqrt(np.mean(error**2)):.4f} |",
+            flush=True,
+        )
+
+
+def converged(seeds: int) -> None:
+    """Print when runs with ``until = "converged"`` end, and the coverage then, a line for each class of signals."""
+    of = Config(Cylinder(), RunSettings(until="converged"))
+    print("\n| signal | converged | 12 periods | tU/D | ± covers | within 2 ± | median ± | rms error |")
+    print("|---|---|---|---|---|---|---|---|")
+    for name, signal in ENDED.items():
+        ends = [judgements(signal, of, seed)[-1] for seed in range(seeds)]
+        why = np.array([found.ended for _, found in ends])
+        drags = [found.averages["C_D'"] for _, found in ends]
+        error, uncertainty = np.array([(abs(drag - SETTLED), drag.uncertainty) for drag in drags]).T
+        shares = [(why == each).mean() for each in ("converged", "periods")]
+        covers = [(error <= k * uncertainty).mean() for k in (1, 2)]
+        print(
+            f"| {name} | {shares[0]:.2f} | {shares[1]:.2f} | {np.median([time for time, _ in ends]):.0f} "
+            f"| {covers[0]:.2f} | {covers[1]:.2f} | {np.median(uncertainty):.4f} | {np.sqrt(np.mean(error**2)):.4f} |",
             flush=True,
         )
 

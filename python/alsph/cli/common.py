@@ -12,10 +12,13 @@ from alsph.text import shown
 WORDS = {int: "a whole number", float: "a number"}
 
 
-def one_of(*choices: object) -> dict[str, Any]:
-    """Return the settings of an option that takes one of some values, which its help names and shells complete."""
+def one_of(*choices: object, beside: str = "") -> dict[str, Any]:
+    """Return the settings of an option that takes one of some values, which its help names and shells complete.
+
+    Beside these it may take any value of a kind.
+    """
     names = [str(choice) for choice in choices]
-    return {"metavar": "|".join(names), "autocompletion": lambda: names}
+    return {"metavar": "|".join([beside, *names] if beside else names), "autocompletion": lambda: names}
 
 
 def number_of(kind: type[int | float], words: tuple[str, ...] = ()) -> Callable[[str], int | float | str]:

@@ -146,7 +146,7 @@ def _options(
             show_default=False,
             rich_help_panel=section,
             parser=number_of(kind, choices) if kind in WORDS else _choice_of(choices) if choices else None,
-            **(one_of(*filter(None, [METAVARS.get(kind)]), *choices) if choices else {"metavar": METAVARS.get(kind)}),
+            **(one_of(*choices, beside=METAVARS.get(kind, "")) if choices else {"metavar": METAVARS.get(kind)}),
         )
         yield inspect.Parameter(
             prefix + name,

@@ -42,7 +42,7 @@ def _resume(
             parser=number_of(float, ("converged",)),
             help="new end time [D/U], or converged",
             show_default="the run's",
-            **one_of("FLOAT", "converged"),
+            **one_of("converged", beside="FLOAT"),
         ),
     ] = None,
     threads: Threads = None,
