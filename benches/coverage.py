@@ -71,22 +71,28 @@ def records(seeds: int) -> None:
 
 
 def converged(seeds: int) -> None:
-    """Print when runs with ``until = "converged"`` end, and the coverage then, a line for each class of signals."""
+    """Print how runs with ``until = "converged"`` end, and the coverage then, a line for each class of signals.
+
+    Time, the ± and the error are those of the runs that have converged.
+    """
     of = Config(Cylinder(), RunSettings(until="converged"))
-    print("\n| signal | converged | 12 periods | tU/D | ± covers | within 2 ± | median ± | rms error |")
-    print("|---|---|---|---|---|---|---|---|")
+    print("\n| signal | 12 periods | covered | converged | tU/D | covered | within 2 ± | median ± | rms error |")
+    print("|---|---|---|---|---|---|---|---|---|")
     for name, signal in ENDED.items():
         ends = [judgements(signal, of, seed)[-1] for seed in range(seeds)]
-        why = np.array([found.ended for _, found in ends])
+        why, time = np.array([found.ended for _, found in ends]), np.array([time for time, _ in ends])
         drags = [found.averages["C_D'"] for _, found in ends]
         error, uncertainty = np.array([(abs(drag - SETTLED), drag.uncertainty) for drag in drags]).T
-        shares = [(why == each).mean() for each in ("converged", "periods")]
-        covers = [(error <= k * uncertainty).mean() for k in (1, 2)]
-        print(
-            f"| {name} | {shares[0]:.2f} | {shares[1]:.2f} | {np.median([time for time, _ in ends]):.0f} "
-            f"| {covers[0]:.2f} | {covers[1]:.2f} | {np.median(uncertainty):.4f} | {np.sqrt(np.mean(error**2)):.4f} |",
-            flush=True,
-        )
+        cells = []
+        for each, factors in (("periods", (1,)), ("converged", (1, 2))):
+            chosen = why == each
+            covered = [
+                f"{np.mean(error[chosen] <= k * uncertainty[chosen]):.2f}" if chosen.any() else "" for k in factors
+            ]
+            when = [f"{np.median(time[chosen]):.0f}" if chosen.any() else ""] * (each == "converged")
+            cells += [f"{chosen.mean():.2f}", *when, *covered]
+        last = [f"{np.median(uncertainty[chosen]):.4f}", f"{np.sqrt(np.mean(error[chosen] ** 2)):.4f}"]
+        print(f"| {name} | {' | '.join([*cells, *last])} |", flush=True)
 
 
 if __name__ == "__main__":

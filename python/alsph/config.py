@@ -51,11 +51,9 @@ TIME = TypeAdapter(Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False
 
 def _time(value: Any, _: Any) -> Any:
     """Tell of a value what is wrong with it as a time, and not what each type of the union has against it."""
-    if value is None or value == "converged":
-        return value
-    if isinstance(value, str):
+    if isinstance(value, str) and value != "converged":
         raise ValueError('must be a time, without quotes, or "converged"')
-    return TIME.validate_python(value)
+    return value if value is None or isinstance(value, str) else TIME.validate_python(value)
 
 
 class RunSettings(Parameters):

@@ -100,16 +100,15 @@ def judge(run: Record, config: Config) -> Judgement:
         missing=missing,
         ended=next((why for why, holds in reasons.items() if holds), ""),
         where=f"{after}, tU/D = {time:.4g}",
-        end=_latest_end(window, latest),
+        end=min(latest, max(_last_period(window), next_judgement(time))),
     )
 
 
-def _latest_end(window: Window, latest: float) -> float:
+def _last_period(window: Window) -> float:
     """Return when so many shedding periods will have been averaged over that the run ends [D/U]."""
     if window.developing or not window.periods:
-        return latest
-    period = (window.end - window.start) / window.periods
-    return min(latest, window.start + MOST_PERIODS * period)
+        return math.inf
+    return window.start + MOST_PERIODS * (window.end - window.start) / window.periods
 
 
 def _above(name: str, value: Estimate, limit: float) -> list[str]:
