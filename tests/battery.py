@@ -4,6 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 from alsph.arrays import FloatArray
+from alsph.config import Config
+from alsph.results.ending import Judgement, judge, next_judgement
+from alsph.results.loads import Loads
 
 SETTLED, STROUHAL, LIFT = 1.4, 0.2, 0.6
 Signal = Callable[[np.random.Generator, FloatArray], tuple[FloatArray, FloatArray]]
@@ -125,4 +128,73 @@ DEVELOPING: dict[str, tuple[float, Signal]] = {
     "drift under shedding": (40, drifting),
     "the same, and noise": (60, wandering_drift),
     "growing": (25, growing),
+}
+
+
+def record(time, drag, lift, of: Config) -> Loads:
+    """Return a run of a cylinder that has recorded these coefficients."""
+    run = Loads()
+    run.config = of
+    columns = {f"cylinder_{part}_force_{axis}": 0 * time for part in ("pressure", "viscous") for axis in "xy"}
+    columns |= {"cylinder_pressure_force_x": drag / 2, "cylinder_pressure_force_y": lift / 2}
+    run.history = {"time": time, **columns}
+    return run
+
+
+def judgements(signal: Signal, of: Config, seed=0) -> list[tuple[float, Judgement]]:
+    """Return when a run with such a signal is judged, and how, up to the judgement with which it ends."""
+    rng, found, time = np.random.default_rng(seed), [], 0.0
+    sampled = times(rng, of.until + 1)
+    drag, lift = signal(rng, sampled)
+    while not found or not found[-1][1].ended:
+        time = min(next_judgement(time), of.until)
+        past = slice(np.searchsorted(sampled, time) + 1)
+        found.append((time, judge(record(sampled[past], drag[past], lift[past], of), of)))
+    return found
+
+
+def varying(correlation, spread, of_lift=0.0):
+    """Shedding whose drag, and amplitude of the lift, wander from period to period by shares of 1.4 and of itself."""
+
+    def signal(rng, time):
+        drag, lift = shedding(time)
+        strength = 1 + autoregressive(rng, time, correlation, of_lift)
+        return SETTLED * (1 + autoregressive(rng, time, correlation, spread)) + transient(time) + drag, strength * lift
+
+    return signal
+
+
+def slow(time_constant):
+    """Shedding over a drag that relaxes slowly, and wanders a little from period to period."""
+
+    def signal(rng, time):
+        drag, lift = varying(0.5, 0.003)(rng, time)
+        return drag + 0.08 * np.exp(-time / time_constant), lift
+
+    return signal
+
+
+def beginning(rng, time):
+    """Shedding that begins at tU/D of 30."""
+    strength = 1 / (1 + np.exp(-0.3 * (time - 30)))
+    drag, lift = shedding(time, strength)
+    noise = 0.003 * rng.normal(size=(2, len(time)))
+    return SETTLED - 0.25 * (1 - strength**2) + transient(time) + drag + noise[0], lift + noise[1]
+
+
+def quiet(rng, time):
+    """No shedding, and noise from step to step."""
+    return SETTLED + transient(time) + 0.005 * rng.normal(size=len(time)), 1e-13 * rng.normal(size=len(time))
+
+
+ENDED: dict[str, Signal] = {
+    "white noise": white,
+    "periods uncorrelated, 0.5 %": varying(0.0, 0.005),
+    "periods AR(1) 0.5, 0.5 %": varying(0.5, 0.005),
+    "periods AR(1) 0.9, 0.5 %": varying(0.9, 0.005),
+    "periods AR(1) 0.5, 0.2 %, lift 1 %": varying(0.5, 0.002, 0.01),
+    "drag relaxes in 20 D/U": slow(20.0),
+    "drag relaxes in 60 D/U": slow(60.0),
+    "shedding begins at 30 D/U": beginning,
+    "steady": quiet,
 }

@@ -118,7 +118,8 @@ def test_parameters_have_names():
         (
             'case = "cylinder"\nreynolds = -1.0\n[run]\nuntil = -4.0\nthreads = 0',
             "reynolds = -1.0: must be greater than 0 (Reynolds number UD/ν [-]); run.until = -4.0: must be greater "
-            "than 0 (end time [D/U]; the case's own default if not given); run.threads = 0: must be",
+            "than 0 (end time [D/U]; the case's own default if not given; or converged: as soon as mean drag, lift and "
+            "shedding are known well enough); run.threads = 0: must be",
         ),
         ("x = " + "[" * 100_000, "nested too deeply"),
         ("x = " + "{a = " * 100_000, "nested too deeply"),

@@ -64,7 +64,9 @@ def test_the_help_of_a_case_says_what_holds_where_nothing_is_given(alsph):
     words = " ".join(alsph("run", "cylinder", "--help")[1].split())
     for text in (
         "--reynolds FLOAT Reynolds number UD/ν [-] [default: 200]",
-        "end time [D/U]; 60 if not given --threads",
+        "--until FLOAT|converged end time [D/U]; 60 if not given; or converged: as soon as mean drag, lift and "
+        "shedding are known well enough --uncertainty",
+        "3 times the default of until if not given --threads",
         "alsph if not given --sound-speed",
         "Units, all four or none: --units-length FLOAT reference length D [m] --units-velocity",
         "-o, --output PATH run folder [default: runs/CASE]",

@@ -159,11 +159,11 @@ def test_remarks_of_a_run(tmp_path):
     assert run.summary()["remark 1"] == run.remarks[0]
     short = Run(tmp_path / "run")
     short.window = replace(short.window, edges=short.window.edges[:5], periods=4)
-    assert outcome(short, 60) == ["few periods: averaged over 4 of shedding; a longer run tells more"]
+    assert outcome(short, "60") == ["few periods: averaged over 4 of shedding; a longer run tells more"]
     short.window = replace(short.window, settled=False, rule="shedding not periodic yet")
-    assert outcome(short, 60) == ["not settled: shedding not periodic yet"]
+    assert outcome(short, "60") == ["not settled: shedding not periodic yet"]
     short.window = replace(short.window, rule="still developing (drag changes by 2 %); later half of the periods")
-    assert outcome(short, 60) == ["still developing: drag changes by 2 %; later half of the periods"]
+    assert outcome(short, "60") == ["still developing: drag changes by 2 %; later half of the periods"]
     info = tmp_path / "run" / "run.json"
     info.write_text('{"status": "diverged", "retries": [{"step": 3, "time_step": 0.01}]}')
     lines = (tmp_path / "run" / "history.csv").read_text().splitlines(keepends=True)

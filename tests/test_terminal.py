@@ -123,7 +123,7 @@ def test_a_pipe_that_nobody_reads_is_no_error(run, arguments):
         (["run", "cylinder", "--reynolds", "much"], "'--reynolds': must be a number, not 'much'\n"),
         (["describe", "cylinder", "--threads", "1e3"], "'--threads': must be a whole number, not '1e3'\n"),
         (["run", "cylinder", "--resolution", "1" * 500], "error: resolution: too large\n"),
-        (["resume", "run", "--until", "soon"], "number\n"),
+        (["resume", "run", "--until", "soon"], "'--until': must be a number or converged, not 'soon'\n"),
         (["validate", "--resolution", "10.5"], "whole number\n"),
         (
             ["run", "cylinder", "--reynolds=-1", "--until=-1"],

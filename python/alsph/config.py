@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
 import tomli_w
-from pydantic import Field, field_validator
+from pydantic import Field, TypeAdapter, WrapValidator, field_validator, model_validator
 
 from alsph import cases
 from alsph.analysis.planes import grids
@@ -34,10 +34,49 @@ KEPT = (str, bool, int, float, list, dict, Parameters, type(None))
 """Kinds of parameters that a configuration file gives back."""
 
 
+Converged = Literal["converged"]
+"""What stands in place of an end time for a run that ends when what it is averaged for is known well enough."""
+
+UNCERTAINTY = 0.003
+"""Largest ± of mean drag and Strouhal number over their values with which a run has converged."""
+
+LATEST = 3.0
+"""When a run that has not converged ends, over the end time that its case has by default."""
+
+OF_CONVERGED = ("uncertainty", "latest")
+"""Settings that go with it."""
+
+TIME = TypeAdapter(Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)])
+
+
+def _time(value: Any, _: Any) -> Any:
+    """Tell of a value what is wrong with it as a time, and not what each type of the union has against it."""
+    if isinstance(value, str) and value != "converged":
+        raise ValueError('must be a time, without quotes, or "converged"')
+    return value if value is None or isinstance(value, str) else TIME.validate_python(value)
+
+
 class RunSettings(Parameters):
     """Settings of a run: how long, on how many threads, and what is written when."""
 
-    until: float | None = Field(default=None, gt=0, description="end time [D/U]; the case's own default if not given")
+    until: Annotated[float | Converged | None, WrapValidator(_time)] = Field(
+        default=None,
+        description="end time [D/U]; the case's own default if not given; or converged: as soon as mean drag, lift and "
+        "shedding are known well enough",
+    )
+    uncertainty: float | None = Field(
+        default=None,
+        gt=0,
+        lt=1,
+        description=f"with until = converged, largest relative ± of mean drag and Strouhal number, {UNCERTAINTY:g} if "
+        "not given; the rms lift may have 10/3 of it [-]",
+    )
+    latest: float | None = Field(
+        default=None,
+        gt=0,
+        description="with until = converged, when the run ends in any case [D/U]; "
+        f"{LATEST:g} times the default of until if not given",
+    )
     threads: int | None = Field(default=None, ge=1, le=4096, description="number of threads; all cores if not given")
     initial_run: str | None = Field(
         default=None,
@@ -91,6 +130,23 @@ class RunSettings(Parameters):
         default=2.0, gt=0, description="longest time that rows of the history stay unwritten [s]"
     )
 
+    @model_validator(mode="after")
+    def _ends_once(self) -> Self:
+        if self.until != "converged":
+            for name in OF_CONVERGED:
+                if (value := getattr(self, name)) is not None:
+                    raise ValueError(f'{name} = {value:g}: goes with until = "converged"; say that too or leave it out')
+        return self
+
+    def replace(self, **changes: Any) -> Self:
+        """Return settings with some changed; an end time takes the place of all that goes with ``"converged"``."""
+        return super().replace(**dict.fromkeys(_superseded(changes)) | changes)
+
+
+def _superseded(changes: dict[str, Any]) -> tuple[str, ...]:
+    """Names of the settings whose place others take."""
+    return OF_CONVERGED if changes.get("until", "converged") != "converged" else ()
+
 
 @dataclass(frozen=True)
 class Config:
@@ -99,15 +155,47 @@ class Config:
     case: cases.Case
     run: RunSettings = RunSettings()
 
+    def __post_init__(self) -> None:
+        """Refuse a run that cannot converge."""
+        if self.converges and not self.case.is_averaged:
+            told = f"{self.case.name} has no body in a stream, whose drag, lift and shedding would be averaged"
+            remedy = f"give an end time, as until = {self.case.default_until:g}"
+            raise ConfigError(f'run.until = "converged": {told}; {remedy}')
+
     @property
     def name(self) -> str:
         """Name of the case."""
         return self.case.name
 
     @property
+    def converges(self) -> bool:
+        """Whether the run ends when it has converged (:mod:`alsph.results.ending`)."""
+        return self.run.until == "converged"
+
+    @property
     def until(self) -> float:
-        """End time [D/U]."""
-        return self.run.until or self.case.default_until
+        """End time, the latest one of a run that ends when it has converged [D/U]."""
+        given = self.run.until
+        if given == "converged":
+            return self.run.latest or LATEST * self.case.default_until
+        return given or self.case.default_until
+
+    @property
+    def until_in_words(self) -> str:
+        """The end time in words."""
+        return f"{'at most ' if self.converges else ''}{self.until:g}"
+
+    @property
+    def uncertainty(self) -> float:
+        """Largest ± of mean drag and Strouhal number over their values with which the run has converged."""
+        return self.run.uncertainty or UNCERTAINTY
+
+    @property
+    def ending(self) -> dict[str, Any]:
+        """The settings that say when the run ends, none left open."""
+        if self.converges:
+            return {"until": "converged", "uncertainty": self.uncertainty, "latest": self.until}
+        return {"until": self.until}
 
     @property
     def work(self) -> float:
@@ -150,7 +238,7 @@ class Config:
 
     def tables(self) -> dict[str, Any]:
         """Return the content of the configuration file; what is not set is left out."""
-        return self.case_tables() | {"run": self.run.model_dump(exclude_none=True) | {"until": self.until}}
+        return self.case_tables() | {"run": self.run.model_dump(exclude_none=True) | self.ending}
 
     def case_tables(self) -> dict[str, Any]:
         """Return the same without the settings of the run."""
@@ -200,7 +288,8 @@ def overridden(tables: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any
     kept = {name: value for name, value in tables.items() if name not in gone}
     settings = {name: value for name, value in changes.items() if name in RunSettings.model_fields}
     parameters = {name: value for name, value in changes.items() if name not in settings}
-    return kept | parameters | {"run": tables.get("run", {}) | settings}
+    run = {name: value for name, value in tables.get("run", {}).items() if name not in _superseded(settings)}
+    return kept | parameters | {"run": run | settings}
 
 
 def of_the_flow(tables: dict[str, Any]) -> dict[str, Any]:

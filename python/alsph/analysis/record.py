@@ -62,6 +62,10 @@ class Record(Protocol):
         """Strouhal number of the lift."""
 
     @property
+    def averaged(self) -> dict[str, Estimate]:
+        """Mean drag C_D' and, with shedding, rms lift C_L' and Strouhal number Sr."""
+
+    @property
     def divergence(self) -> Divergence:
         """Velocity divergence."""
 

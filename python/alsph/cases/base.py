@@ -8,7 +8,7 @@ import re
 import warnings
 from abc import abstractmethod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,6 +147,11 @@ class Case(Driven):
             for length, sides in zip(domain.size, domain.boundaries, strict=True)
         ]
         return round(math.prod(columns))
+
+    @property
+    def is_averaged(self) -> bool:
+        """Whether drag, lift and shedding of a body are what its runs are averaged for."""
+        return self.settles and bool(self.coefficient_bodies)
 
     def surface_points(self) -> Surface | None:
         """Return where the surface pressure is sampled."""
@@ -360,7 +365,7 @@ class Case(Driven):
     def run(
         self,
         folder: str | Path,
-        until: float | None = None,
+        until: float | Literal["converged"] | None = None,
         threads: int | None = None,
         *,
         force: bool = False,
@@ -376,7 +381,7 @@ class Case(Driven):
         folder
             The run folder to create.
         until
-            End time [D/U]; the case's own default if None.
+            End time [D/U], or ``"converged"``: when the averages are known well enough; the case's own default if None.
         threads
             Number of threads; all cores if None.
         force

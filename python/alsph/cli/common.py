@@ -1,17 +1,37 @@
 """Arguments and options that several commands have."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 import alsph
+from alsph.text import shown
+
+WORDS = {int: "a whole number", float: "a number"}
 
 
-def one_of(*choices: object) -> dict[str, Any]:
-    """Return the settings of an option that takes one of some values, which its help names and shells complete."""
+def one_of(*choices: object, beside: str = "") -> dict[str, Any]:
+    """Return the settings of an option that takes one of some values, which its help names and shells complete.
+
+    Beside these it may take any value of a kind.
+    """
     names = [str(choice) for choice in choices]
-    return {"metavar": "|".join(names), "autocompletion": lambda: names}
+    return {"metavar": "|".join([beside, *names] if beside else names), "autocompletion": lambda: names}
+
+
+def number_of(kind: type[int | float], words: tuple[str, ...] = ()) -> Callable[[str], int | float | str]:
+    """Return a function that reads a number, or one of some words in its place, and says what is wrong with one."""
+
+    def number(text: str) -> int | float | str:
+        try:
+            return text if text in words else kind(text)
+        except ValueError:
+            known = " or ".join((WORDS[kind], *words))
+            raise typer.BadParameter(f"must be {known}, not {shown(text)}") from None
+
+    return number
 
 
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="run folder")]

@@ -16,17 +16,14 @@ from typer.main import get_command
 from alsph import cases, config
 from alsph.cases.driven import RULES
 from alsph.cases.method import OWN, Method
-from alsph.cli.common import one_of
+from alsph.cli.common import WORDS, number_of, one_of
 from alsph.cli.help import App, Group
 from alsph.cli.terminal import exit_codes
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters, describe_default
 from alsph.symbols import Symbols
-from alsph.text import shown
 from alsph.units import Units
-
-WORDS = {int: "a whole number", float: "a number"}
 
 METAVARS: dict[Any, str] = {int: "INTEGER", float: "FLOAT", list[str]: "TEXT"}
 
@@ -187,8 +184,8 @@ def _options(
             hidden=name in idle,
             show_default=False,
             rich_help_panel=section,
-            parser=_choice_of(choices) if choices else _number_of(kind) if kind in WORDS else None,
-            **(one_of(*choices) if choices else {"metavar": METAVARS.get(kind)}),
+            parser=number_of(kind, choices) if kind in WORDS else _choice_of(choices) if choices else None,
+            **(one_of(*choices, beside=METAVARS.get(kind, "")) if choices else {"metavar": METAVARS.get(kind)}),
         )
         yield inspect.Parameter(
             prefix + name,
@@ -208,13 +205,13 @@ def _default(model: type[Parameters], name: str, required: str) -> str:
 
 def _option_type(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
     """Return the type that an option is read as, and its choices if there are few."""
-    if get_origin(annotation) in (Union, types.UnionType):
-        if {str, list} <= {get_origin(member) or member for member in get_args(annotation)}:
-            return list[str], ()  # a text that lists things: the option may be repeated
-        annotation = next(member for member in get_args(annotation) if member is not type(None))
-    if get_origin(annotation) is Literal:
-        return str, get_args(annotation)
-    return annotation, ()
+    union = get_origin(annotation) in (Union, types.UnionType)
+    members = {member: get_origin(member) or member for member in (get_args(annotation) if union else (annotation,))}
+    if {str, list} <= {*members.values()}:
+        return list[str], ()  # a text that lists things: the option may be repeated
+    kinds = [member for member, origin in members.items() if origin not in (Literal, type(None))]
+    choices = [choice for member, origin in members.items() if origin is Literal for choice in get_args(member)]
+    return kinds[0] if kinds else str, tuple(choices)
 
 
 def _choice_of(choices: tuple[Any, ...]) -> Callable[[str], Any]:
@@ -224,15 +221,3 @@ def _choice_of(choices: tuple[Any, ...]) -> Callable[[str], Any]:
         return next((choice for choice in choices if str(choice) == text), text)
 
     return choice
-
-
-def _number_of(kind: type[int | float]) -> Callable[[str], int | float]:
-    """Return a function that reads a number, and says what is wrong with one."""
-
-    def number(text: str) -> int | float:
-        try:
-            return kind(text)
-        except ValueError:
-            raise typer.BadParameter(f"must be {WORDS[kind]}, not {shown(text)}") from None
-
-    return number

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 import alsph
-from alsph.cli.common import Plane, Retry, RunPath, Threads, Walltime, one_of
+from alsph.cli.common import Plane, Retry, RunPath, Threads, Walltime, number_of, one_of
 from alsph.cli.help import App
 from alsph.cli.terminal import complain, exit_codes, say, say_run
 from alsph.errors import ConfigError, RunFolderError
@@ -36,7 +36,15 @@ app = App()
 @exit_codes()
 def _resume(
     path: RunPath,
-    until: Annotated[float | None, typer.Option(help="new end time [D/U]", show_default="the run's")] = None,
+    until: Annotated[
+        Any,
+        typer.Option(
+            parser=number_of(float, ("converged",)),
+            help="new end time [D/U], or converged",
+            show_default="the run's",
+            **one_of("converged", beside="FLOAT"),
+        ),
+    ] = None,
     threads: Threads = None,
     walltime: Walltime = None,
     retry: Retry = 0,

@@ -82,12 +82,14 @@ def info(path: Path) -> dict[str, Any]:
         "began": dict,
         "start": dict,
         "case_class": str,
+        "ended": dict,
     }
     tables: dict[str, dict[str, Any]] = {
         "segments": {"step": int, "case": dict},
         "retries": {"step": int, "time_step": (int, float)},
         "checkpoint": {"step": int, "time": (int, float), "state_sha256": str},
         "start": {"state_sha256": str},
+        "ended": {"step": int, "remark": str},
     }
     found: list[tuple[Any, dict[str, Any], bool]] = [(content, kinds, False)]
     for name, inner in tables.items():

@@ -158,6 +158,14 @@ class Loads(Fields):
         return self._measure(averages.strouhal, self.coefficient("y"))
 
     @cached_property
+    def averaged(self) -> dict[str, Estimate]:
+        """What a body is averaged for: mean drag C_D' and, with shedding, rms lift C_L' and Strouhal number Sr."""
+        drag = {"C_D'": self._measure(averages.mean, self.coefficient("x"))}
+        if not self.window.periods:
+            return drag
+        return drag | {"C_L'": self._measure(averages.root_mean_square, self.coefficient("y")), "Sr": self.strouhal}
+
+    @cached_property
     def divergence(self) -> Divergence:
         """Velocity divergence over the averaging window."""
         columns = (self.history.get(f"divergence_{name}", np.empty(0)) for name in ("mean", "sum", "max"))

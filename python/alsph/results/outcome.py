@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from alsph.analysis.record import Record
+from alsph.analysis.window import Window
 from alsph.arrays import FloatArray
 
 DIVERGENCE = 0.02
@@ -13,13 +14,13 @@ DIVERGENCE = 0.02
 FEW_PERIODS = 5
 
 
-def outcome(run: Record, until: float) -> list[str]:
-    """Remark on how a run that was to reach `until` [D/U] ended and on its statistics."""
+def outcome(run: Record, until: str) -> list[str]:
+    """Remark on how a run that was to reach `until` [D/U] in words ended, and on its statistics."""
     time = run.history["time"]
-    found = []
+    found = [str(ended["remark"])] if (ended := run.info.get("ended")) else []
     if run.status != "finished":
         reached = time[-1] if len(time) else 0.0
-        found.append(f"{run.status}: at tU/D = {reached:.4g} of {until:g}; results are those up to there")
+        found.append(f"{run.status}: at tU/D = {reached:.4g} of {until}; results are those up to there")
     if retries := run.info.get("retries"):
         found.append(f"retried: broke down {len(retries)} times, went on with smaller time steps")
     if run.divergence.mean > DIVERGENCE:
@@ -30,13 +31,7 @@ def outcome(run: Record, until: float) -> list[str]:
         found.append(f"not divergence-free: {text}; {remedy}")
     found += lost(run)
     if run.body and run.window.edges.size:
-        rule = run.window.rule
-        if rule.startswith("still developing ("):
-            found.append(rule.replace(" (", ": ", 1).replace(")", "", 1))
-        elif run.window.periods and not run.window.settled:
-            found.append(f"not settled: {rule}")
-        elif 0 < run.window.periods < FEW_PERIODS:
-            found.append(f"few periods: averaged over {run.window.periods} of shedding; a longer run tells more")
+        found += unsettled(run.window)
         if run.drag.mean < 0 and not has_moved(run.history):
             found.append(f"unphysical: mean drag coefficient {run.drag.mean}; a stream drags a body at rest along")
     return found
@@ -45,6 +40,17 @@ def outcome(run: Record, until: float) -> list[str]:
 def has_moved(history: Mapping[str, FloatArray]) -> bool:
     """Whether bodies have moved as rigid ones."""
     return any(name.endswith("_displacement_x") for name in history)
+
+
+def unsettled(window: Window, least_periods: int = FEW_PERIODS) -> list[str]:
+    """Remark on a window in which the averages are not yet, or not surely, those of a settled flow."""
+    if window.developing:
+        return [window.rule.replace(" (", ": ", 1).replace(")", "", 1)]
+    if window.periods and not window.settled:
+        return [f"not settled: {window.rule}"]
+    if 0 < window.periods < least_periods:
+        return [f"few periods: averaged over {window.periods} of shedding; a longer run tells more"]
+    return []
 
 
 def has_surface(history: Mapping[str, FloatArray]) -> bool:

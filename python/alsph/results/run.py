@@ -125,7 +125,7 @@ class Run(Loads):
         """
         case = self.config.case
         solved = unsolved(self, case.residual_tolerance, case.most_iterations)
-        found = [*outcome(self, self.config.until), *solved, *self._judged[1], *case.remarks()]
+        found = [*outcome(self, self.config.until_in_words), *solved, *self._judged[1], *case.remarks()]
         return [self.symbols(remark) for remark in found]
 
     @property

@@ -70,11 +70,12 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
             / 2**20
         )
         lines.append(("planes", f"{points:,} points, recorded every {interval:g} D/U: about {size:.2g} MiB"))
-    lines.append(("steps", f"about {steps:,.0f} to t* = {config.until:g}"))
+    most = "at most, until converged, " if config.converges else ""
+    lines.append(("steps", f"{most}about {steps:,.0f} to t* = {config.until:g}"))
     if probe:
         try:
             seconds = _seconds_per_step(case.restored(problem.state, config.run.threads))
-            lines.append(("estimated time", f"{duration(seconds * steps)} at {seconds:.3g} s a step"))
+            lines.append(("estimated time", f"{most}{duration(seconds * steps)} at {seconds:.3g} s a step"))
         except SolverError as error:
             lines.append(("warning", f"breaks down in the first steps: {error}"))
     if warning := case.time_step_warning():

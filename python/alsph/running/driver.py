@@ -14,7 +14,10 @@ from alsph.config import Config
 from alsph.engine.simulation import SLICE_SECONDS, Simulation, next_multiple
 from alsph.errors import AlsphError, Interrupted, SolverError, WalltimeError
 from alsph.folder import checkpoint
+from alsph.folder.reading import History
 from alsph.folder.run_folder import RunFolder
+from alsph.results.ending import judge, next_judgement
+from alsph.results.run import Run
 from alsph.running import beginning
 from alsph.running.control import Control, interruptible
 from alsph.running.outputs import outputs_of, remarks_of
@@ -56,6 +59,9 @@ class Driver:
         self.outputs = outputs_of(config)
         self.due = [next_multiple(simulation.time, output.interval) for output in self.outputs]
         self.next_output = next_multiple(simulation.time, config.run.output_interval)
+        self.next_judgement = self._next_judgement()
+        self.recorded = History(self.folder.path / "history.csv")
+        self.ended: dict[str, Any] = {}
         self.unwritten: list[dict[str, Any]] = []
         self.flushed = self.checkpointed = clock.monotonic()
         self._note_checkpoint(simulation.state())
@@ -72,7 +78,8 @@ class Driver:
         remarks = remarks_of(self.config, self.simulation.state())
         for remark in remarks:
             self.folder.log(f"remark: {remark}")
-        with Reporter(self.config.until, self.simulation.time, enabled=control.progress) as reporter:
+        at_most = self.config.converges
+        with Reporter(self.config.until, self.simulation.time, at_most=at_most, enabled=control.progress) as reporter:
             for remark in remarks:
                 reporter.say(f"remark: {remark}")
             try:
@@ -107,18 +114,22 @@ class Driver:
         if self.simulation.step == 0:
             self._output()
         self._write_status("running")
-        while self.simulation.time < self.config.until and not stop.is_set():
+        while not self._over and not stop.is_set():
             began = clock.monotonic()
-            self.simulation.run_until(min(*self.due, self.next_output, self.config.until), SLICE_SECONDS)
-            reporter.update(self._record())
+            stops = (*self.due, self.next_output, self.next_judgement, self.config.until)
+            self.simulation.run_until(min(stops), SLICE_SECONDS)
+            reporter.update(self._record(reporter))
             self.pause = max(self.pause, clock.monotonic() - began)
             if clock.monotonic() + 2 * self.pause >= self.deadline:
                 break
-        finished = self.simulation.time >= self.config.until
-        self._checkpoint("finished" if finished else "interrupted")
-        return finished
+        self._checkpoint("finished" if self._over else "interrupted")
+        return self._over
 
-    def _record(self) -> dict[str, Any]:
+    @property
+    def _over(self) -> bool:
+        return bool(self.ended) or self.simulation.time >= self.config.until
+
+    def _record(self, reporter: Reporter) -> dict[str, Any]:
         """Write what is due, and return the new rows of the history."""
         rows, now, time = self.simulation.new_history(keep=False), clock.monotonic(), self.simulation.time
         self.unwritten.append(rows)
@@ -127,11 +138,13 @@ class Driver:
             self.logged_backflow = True
         if len(rows["time_step"]):
             self.time_step = float(rows["time_step"][-1])
+        if time >= self.next_judgement:
+            self._judge(reporter)
         for number, output in enumerate(self.outputs):
             if time >= self.due[number]:
                 self.due[number] = next_multiple(time, output.interval)
                 output.record(self.simulation, rows)
-        if time >= min(self.next_output, self.config.until):
+        if time >= self.next_output or self._over:
             self.next_output = next_multiple(time, self.config.run.output_interval)
             self._output()
         elif now - self.checkpointed >= 60 * self.config.run.checkpoint_minutes:
@@ -139,6 +152,28 @@ class Driver:
         elif now - self.flushed >= self.config.run.flush_seconds:
             self._flush()
         return rows
+
+    def _next_judgement(self) -> float:
+        """Return when the run is judged next, which one with an end time never is."""
+        return min(next_judgement(self.simulation.time), self.config.until) if self.config.converges else math.inf
+
+    def _judge(self, reporter: Reporter) -> None:
+        """Ask whether the run has converged.
+
+        That it has is told by ``run.json`` before there is a checkpoint from which the run could go on all the same.
+        """
+        self._flush()
+        self.next_judgement = self._next_judgement()
+        run = Run(self.folder.path)
+        run.config, run.history = self.config, self.recorded.read()
+        found = judge(run, self.config)
+        reporter.judged(str(found), found.end)
+        if found.ended:
+            self.ended = {"why": found.ended, "remark": found.remark, "step": self.simulation.step}
+            self.ended["settings"] = self.config.ending
+            self._write_status("running")
+            self.folder.log(found.remark)
+            reporter.say(found.remark)
 
     def _output(self) -> None:
         self.folder.append_particles(self.simulation.time, self.simulation.snapshot())
@@ -207,7 +242,7 @@ class Driver:
             "case": self.config.case.name,
             "message": message,
             "time": self.simulation.time,
-            "until": self.config.until,
+            "until": self.simulation.time if self.ended else self.config.until,
             "step": self.simulation.step,
             "checkpoint": self.saved,
             "particles": self.simulation.counts,
@@ -225,6 +260,8 @@ class Driver:
             facts["cpu_seconds"] = round(clock.process_time() - self.cpu_started, 3)
         if self.start is not None:
             facts["start"] = self.start
+        if self.ended:
+            facts["ended"] = self.ended
         self.folder.write_info(facts | self.provenance)
         if status != "running":
             self.folder.log(f"{status} at {self.where} after {duration(seconds)}. {message}")

@@ -24,12 +24,15 @@ class Reporter:
         End time [D/U].
     time
         Time at the start [D/U].
+    at_most
+        Whether it may end earlier.
     enabled
         Report at all.
     """
 
-    def __init__(self, until: float, time: float, *, enabled: bool = True) -> None:
+    def __init__(self, until: float, time: float, *, at_most: bool = False, enabled: bool = True) -> None:
         self._until, self._first_time, self._enabled = until, time, enabled
+        self._eta, self._judgement = "ETA at most" if at_most else "ETA", ""
         console = Console(highlight=False)
         self._console = console
         self._live: Live | None = None
@@ -39,7 +42,7 @@ class Reporter:
 
             self._line = display({"text/plain": "started"}, raw=True, display_id=True)  # type: ignore[no-untyped-call]
         elif enabled and console.is_terminal:
-            rate = TextColumn("{task.description}  ETA")
+            rate = TextColumn("{task.description}  " + self._eta)
             self._bar = Progress(BarColumn(), TaskProgressColumn(), rate, TimeRemainingColumn(), console=console)
             self._task = self._bar.add_task("", total=until)
             self._bar.update(self._task, completed=time)
@@ -69,6 +72,12 @@ class Reporter:
             except (OSError, ValueError, SystemExit):
                 self._enabled = False
 
+    def judged(self, judgement: str, until: float) -> None:
+        """Take in what the run has come to, told from now on, and when it will end at the latest [D/U]."""
+        self._judgement, self._until = judgement, until
+        if self._live:
+            self._bar.update(self._task, total=until)
+
     def update(self, rows: dict[str, Any]) -> None:
         """Report new rows of the history; where nobody listens any more, say nothing from then on."""
         if self._enabled and len(rows["step"]):
@@ -85,12 +94,13 @@ class Reporter:
         pause = NOTEBOOK_SECONDS if self._line else PLAIN_SECONDS
         if self._live:
             self._bar.update(self._task, completed=min(time, self._until), description=rate)
-            self._live.update(Group(self._bar, Text(physics_line(rows))))
+            self._live.update(Group(self._bar, Text(physics_line(rows)), *map(Text, filter(None, [self._judgement]))))
         elif now - self._last_line >= pause or (self._line and time >= self._until):
             self._last_line = now
             done = (time - self._first_time) / (self._until - self._first_time)
             left = duration(seconds * (1 / done - 1)) if done > 0 else "?"
-            line = f"{100 * min(1.0, time / self._until):5.1f} %  {rate}  ETA {left}  {physics_line(rows)}"
+            line = f"{100 * min(1.0, time / self._until):5.1f} %  {rate}  {self._eta} {left}  {physics_line(rows)}"
+            line += f"  {self._judgement}" * bool(self._judgement)
             if self._line:
                 self._line.update({"text/plain": line}, raw=True)
             else:

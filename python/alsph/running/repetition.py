@@ -89,7 +89,7 @@ def repeat(path: str | Path, threads: int | None = None, *, progress: bool = Tru
     simulation = _begun(parts[0][1], parts[-1][1], threads, folder, info)
     bodies = [body["name"] for body in simulation.problem.settings["bodies"]]
     recorded = folder.path / "history.csv"
-    start, until = info.get("start", {}).get("state_sha256"), parts[-1][1].until
+    start, until = info.get("start", {}).get("state_sha256"), info["checkpoint"]["time"]
     unequal = "" if start in (None, checkpoint.digest(simulation.state())) else UNLIKE_START
     if not recorded.is_file():
         raise RunFolderError(f"{path}: {recorded.name} is missing, with which the repetition is compared")

@@ -8,7 +8,7 @@ from typing import Any
 from alsph import config
 from alsph.arrays import size_of
 from alsph.cases.base import Case
-from alsph.config import Config, RunSettings, of_run, of_the_flow
+from alsph.config import Config, Converged, RunSettings, of_run, of_the_flow
 from alsph.engine.prescribed import difference
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.folder.checkpoint import Checkpoint
@@ -64,7 +64,7 @@ def complete(config: Config, path: Path, control: Control | None = None) -> Run:
         info = folder.last_info()
         # Retries shorten the time step: the run is still that of the case that it began with.
         began = info.get("began", {}) if info.get("retries") else kept.case_tables()
-        alike = (of_the_flow(began), kept.until) == (config.flow_tables(), config.until)
+        alike = (of_the_flow(began), kept.ending) == (config.flow_tables(), config.ending)
         if alike and beginning.alike(config, kept, folder, info):
             if info.get("status") == "finished":
                 return Run(path)
@@ -79,7 +79,7 @@ def complete(config: Config, path: Path, control: Control | None = None) -> Run:
 
 def resume(
     path: str | Path,
-    until: float | None = None,
+    until: float | Converged | None = None,
     threads: int | None = None,
     *,
     walltime: float = math.inf,
@@ -93,7 +93,7 @@ def resume(
     path
         The run folder.
     until
-        New end time [D/U]; the run's own if None.
+        New end time [D/U], or ``"converged"``; the run's own if None.
     threads
         Number of threads; the run's own if None.
     walltime, retry, progress
@@ -114,22 +114,23 @@ def resume(
     return _resume(RunFolder(Path(path)), until, threads, Control(progress, walltime=walltime, retry=retry))
 
 
-def _resume(folder: RunFolder, until: float | None, threads: int | None, control: Control) -> Run:
+def _resume(folder: RunFolder, until: float | Converged | None, threads: int | None, control: Control) -> Run:
     of_run(folder.path)  # refuses what is no run folder before the claim makes one
     with folder.claimed():
         config, info = of_run(folder.path), folder.last_info()
         _check_parameters(config, folder)
         beginning.check_class(config.case, info, folder.path)
         changes = {name: value for name, value in (("until", until), ("threads", threads)) if value is not None}
-        own_end, config = config.until, Config(config.case, config.run.replace(**changes))
+        own, config = config, Config(config.case, config.run.replace(**changes))
         saved = folder.read_checkpoint()
         if not isinstance(saved.state["time"], float):
             raise RunFolderError(f"{folder.path}: its checkpoint is of no time")
-        if saved.state["time"] >= config.until:
+        if _has_ended(config, saved, info):
             if until is not None:
-                reached = f"the run has reached t* = {saved.state['time']:.6g}, and until = {until:g}"
+                told = f"{until:g}" if isinstance(until, float | int) else until
+                reached = f"the run has reached t* = {saved.state['time']:.6g}, and until = {told}"
                 warnings.warn(f"{folder.path}: nothing to be done: {reached}", RuntimeWarning, stacklevel=3)
-            if info.get("status") != "finished" and saved.state["time"] >= own_end:  # cut after its last step
+            if info.get("status") != "finished" and _has_ended(own, saved, info):  # cut after its last step
                 folder.write_info(info | {"status": "finished"})
             return Run(folder.path)
         remarks = [saved.warning] if saved.warning else []
@@ -151,6 +152,13 @@ def _resume(folder: RunFolder, until: float | None, threads: int | None, control
             warnings.warn(f"{folder.path}: {remark}", RuntimeWarning, stacklevel=3)
         Driver(config, folder, simulation, info).run(control)
     return Run(folder.path)
+
+
+def _has_ended(config: Config, saved: Checkpoint, info: dict[str, Any]) -> bool:
+    """Whether a run with these settings ends where its checkpoint is; `info` tells if it has converged there."""
+    ended = info.get("ended", {})
+    judged = (ended.get("step"), ended.get("settings")) == (saved.state["step"], config.ending)
+    return bool(judged or saved.state["time"] >= config.until)
 
 
 def _check_parameters(config: Config, folder: RunFolder) -> None:

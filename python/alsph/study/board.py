@@ -95,14 +95,15 @@ class Board:
     def _line(self, point: Point, state: State, now: float) -> str:
         line = f"{state.status:8}  {point.label}"
         if state.status == "running":
-            line += f"  t* {state.time:.2f} of {point.config.until:g}  ETA {self._left(point, state, now)}"
+            line += f"  t* {state.time:.2f} of {point.config.until_in_words}  ETA {self._left(point, state, now)}"
         return f"{line}  {state.message}" if state.status == "failed" else line
 
     def _left(self, point: Point, state: State, now: float) -> str:
         time, seen = self.first.get(point.name, (state.time, now))
         if state.time <= time:
             return "?"
-        return duration((now - seen) * (point.config.until - state.time) / (state.time - time))
+        most = "at most " * point.config.converges
+        return most + duration((now - seen) * (point.config.until - state.time) / (state.time - time))
 
     def _total(self, found: Mapping[str, State], now: float) -> str:
         counts = Counter(found[point.name].status for point in self.points)
@@ -131,7 +132,8 @@ def overview(points: Sequence[Point], found: Mapping[str, State]) -> list[str]:
     lines = []
     for point in points:
         state = found[point.name]
-        reached = f"t* {state.time:.4g} of {point.config.until:g}, {duration(state.seconds)}" if state.seconds else ""
+        until = point.config.until_in_words
+        reached = f"t* {state.time:.4g} of {until}, {duration(state.seconds)}" if state.seconds else ""
         lines.append("  ".join(part for part in (f"{state.status:8}", point.label, reached, state.message) if part))
     counts = Counter(found[point.name].status for point in points)
     return [*lines, f"{len(points)} runs: " + ", ".join(f"{count} {status}" for status, count in counts.items())]

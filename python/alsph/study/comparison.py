@@ -220,7 +220,7 @@ def _parameters(run: Run) -> dict[str, str]:
     config, declared = run.config, run.config.case.declaration()
     values = {name: getattr(config.case, name) for name in config.case.parameter_names()}
     settings = {f"run.{name}": getattr(config.run, name) for name in type(config.run).model_fields}
-    values |= settings | {"run.until": config.until}
+    values |= settings | {f"run.{name}": value for name, value in config.ending.items()}
     case = f"{shown_name(declared)}{_sum(declared['sha256'])}" if isinstance(declared, dict) else declared
     return {"case": case} | {name: _parameter(value) for name, value in values.items()}
 

@@ -203,10 +203,12 @@ def _progress(run: Run) -> dict[str, Any]:
     if running:  # run.json is written every now and then, the history every other second
         written = [(run.path / name).stat().st_mtime for name in ("run.json", "history.csv") if len(time)]
         seconds += max(0.0, written[1] - written[0]) if written else 0.0
-    found = {"time": f"{reached:.4g}", "until": f"{until:g}", "share": min(1.0, reached / until), "steps": len(time)}
-    found |= {"seconds": duration(seconds)} if seconds > 0 else {}
+    settings = run.case.get("run")
+    most = "at most " * (isinstance(settings, dict) and settings.get("until") == "converged" and running)
+    found = {"time": f"{reached:.4g}", "until": f"{most}{until:g}", "share": min(1.0, reached / until)}
+    found |= {"steps": len(time), **({"seconds": duration(seconds)} if seconds > 0 else {})}
     if running and 0 < reached < until and seconds > 0:
-        found["left"] = duration(seconds * (until - reached) / reached)
+        found["left"] = (most or "about ") + duration(seconds * (until - reached) / reached)
     return found
 
 
