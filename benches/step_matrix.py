@@ -1,0 +1,77 @@
+"""The largest eigenvalue of a step beside a free surface: `python benches/step_matrix.py`, some minutes.
+
+A square of 12 x 12 particles at rest in a tank of mirrors or of solids, without gravity; each velocity and pressure is
+disturbed in turn, and what a step makes of it is a column of the matrix. No modulus may be above 1, but for single
+precision.
+"""
+
+from typing import Any, ClassVar
+
+import numpy as np
+import shapely
+from alsph import Domain, SolidBody
+from alsph.cases import FreeSurface
+from alsph.geometry.lattice import cell_centres, lattice
+from alsph.geometry.particles import join
+from alsph.geometry.solids import walls
+from numpy.typing import NDArray
+
+SIDE, SIZE = 12, 1e-5
+
+
+class Square(FreeSurface):
+    """Fluid in the lower half of a tank without gravity."""
+
+    gravity: ClassVar[bool] = False
+    tension: ClassVar[bool] = True
+    solids: bool = False
+
+    def domain(self) -> Domain:
+        """Return the tank."""
+        side = "none" if self.solids else "slip"
+        return Domain((0, 0), (1, 2), [(side, side), (side, "air")])
+
+    def bodies(self) -> list[SolidBody]:
+        """Return its walls."""
+        return [SolidBody("tank", (0, 0))] if self.solids else []
+
+    def particles(self) -> dict[str, NDArray[Any]]:
+        """Return the square on its floor."""
+        cells = cell_centres(SIDE, 1 / SIDE)
+        position = lattice(cells, cells)
+        fluid = self.fluid(position, np.zeros_like(position), np.zeros(len(position)))
+        tank = walls(shapely.box(0, 0, 1, 2), 1 / SIDE, self.support_layers)
+        return join(fluid, tank.particles()) if self.solids else fluid
+
+
+def radius(case: Square, disorder: float) -> float:
+    """Return the largest modulus of an eigenvalue of a step, of particles displaced by up to `disorder` spacings."""
+    simulation = case.simulation(threads=1)
+    start = simulation.state()
+    fluid = np.flatnonzero(start["kind"] == 0)
+    start["position"][fluid] += np.random.default_rng(1).uniform(-disorder, disorder, (len(fluid), 2)) / SIDE
+
+    def after(unknown: int, size: float) -> NDArray[Any]:
+        state = {name: np.copy(values) if np.ndim(values) else values for name, values in start.items()}
+        if unknown < 2 * len(fluid):
+            state["velocity"][fluid[unknown // 2], unknown % 2] += size
+        else:
+            state["pressure"][fluid[unknown - 2 * len(fluid)]] += size
+        simulation.restore(state)
+        simulation.advance()
+        end = simulation.state()
+        order = np.argsort(end["id"])[np.argsort(np.argsort(start["id"]))][fluid]
+        return np.concatenate([end["velocity"][order].ravel(), end["pressure"][order]])
+
+    columns = [(after(k, SIZE) - after(k, -SIZE)) / (2 * SIZE) for k in range(3 * len(fluid))]
+    return float(np.abs(np.linalg.eigvals(np.stack(columns, axis=1))).max())
+
+
+if __name__ == "__main__":
+    for solids in (False, True):
+        for gradient in ("adjoint", "conservative"):
+            for disorder in (0.0, 0.1):
+                case = Square(resolution=SIDE, solids=solids, pressure_gradient=gradient)
+                walls_are = "solids" if solids else "mirrors"
+                excess = radius(case, disorder) - 1
+                print(f"{walls_are:8} {gradient:13} disorder {disorder:g}: radius - 1 = {excess:.1e}", flush=True)
