@@ -39,6 +39,7 @@ from alsph.cases.pipe import Pipe
 from alsph.cases.poiseuille import Poiseuille
 from alsph.cases.pressure_jump import PressureJump
 from alsph.cases.pulsating_channel import PulsatingChannel
+from alsph.cases.rolling_tank import RollingTank
 from alsph.cases.rotating_patch import RotatingPatch
 from alsph.cases.settling_sphere import SettlingSphere
 from alsph.cases.sloshing import Sloshing
@@ -59,7 +60,17 @@ CASES: dict[str, type[Case]] = {
         *(Cylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Nozzle, Bend, Cavity),
         *(Poiseuille, Couette, TaylorCouette, PulsatingChannel, Pipe, PressureJump, TaylorGreen),
         *(OscillatingCylinder, TowedCylinder, ConcentricRelease, SettlingSphere),
-        *(DamBreak, DamBreakObstacle, StandingWave, StillWater, Sloshing, FloatingBox, EllipticalDrop, RotatingPatch),
+        *(
+            DamBreak,
+            DamBreakObstacle,
+            StandingWave,
+            StillWater,
+            Sloshing,
+            RollingTank,
+            FloatingBox,
+            EllipticalDrop,
+            RotatingPatch,
+        ),
     )
 }
 
@@ -90,6 +101,7 @@ __all__ = [
     "Poiseuille",
     "PressureJump",
     "PulsatingChannel",
+    "RollingTank",
     "RotatingPatch",
     "SettlingSphere",
     "Sloshing",

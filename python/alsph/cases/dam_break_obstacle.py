@@ -15,12 +15,11 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.dam_break import column_pressure
 from alsph.cases.free_surface import FreeSurface
-from alsph.cases.series import Series
+from alsph.cases.sensors import WallSensors
 from alsph.engine.output import Output
-from alsph.engine.simulation import Simulation
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, lattice
-from alsph.geometry.particles import Kind, join
+from alsph.geometry.particles import join
 from alsph.geometry.solids import Solid
 
 DEPTH = 0.55
@@ -41,27 +40,6 @@ SENSORS = {"P1": 0.021 / DEPTH, "P3": 0.101 / DEPTH}
 PLACE = 0.029 / DEPTH
 
 SOURCE = "experiment, Kleefsman et al. (2005)"
-
-
-class Sensors(Series):
-    """The pressure at the sensors over time: the mean of solid particles within a spacing."""
-
-    file = "output_sensors.csv"
-    interval = 0.01
-
-    def __init__(self, case: DamBreakObstacle) -> None:
-        face = case.box[0, 0]
-        self.points = np.array([[face, PLACE, height] for height in SENSORS.values()])
-        self.spacing = case.particle_spacing
-        super().__init__(["time [√(H/g)]", *(f"{name} [ρgH]" for name in SENSORS)])
-
-    def values(self, simulation: Simulation) -> FloatArray:
-        """Return the present pressures (m,)."""
-        state = simulation.state()
-        solid = (state["kind"] == Kind.SOLID) & (state["normal"][:, 0] < -0.9)
-        place, pressure = state["position"][solid], state["pressure"][solid]
-        close = [np.linalg.norm(place - point, axis=1) < 1.01 * self.spacing for point in self.points]
-        return np.array([pressure[near].mean() for near in close])
 
 
 class DamBreakObstacle(FreeSurface):
@@ -151,14 +129,16 @@ class DamBreakObstacle(FreeSurface):
 
     def outputs(self) -> list[Output]:
         """Return the record of the sensors."""
-        return [Sensors(self)]
+        face = self.box[0, 0]
+        places = {name: (np.array([face, PLACE, height]), np.array([-1.0, 0, 0])) for name, height in SENSORS.items()}
+        return [WallSensors(places, 0, np.zeros(3), self.particle_spacing)]
 
     def measures(self, run: Record) -> list[Measure]:
         """Return arrival and mean pressures at the sensors beside the experiment, and what energy was made."""
         return [*self._at_sensors(run), *self.energy_measures(run)]
 
     def _at_sensors(self, run: Record) -> list[Measure]:
-        time, pressure = Sensors.read(run)
+        time, pressure = WallSensors.read(run)
         rows: list[Measure] = []
         for name, own in zip(SENSORS, pressure, strict=False):
             at, measured = reference.table(f"dam_break_obstacle_{name.lower()}.csv")
@@ -174,7 +154,7 @@ class DamBreakObstacle(FreeSurface):
 
     def profiles(self, run: Record) -> list[Profile]:
         """Return the pressure at the sensors over time."""
-        time, pressure = Sensors.read(run)
+        time, pressure = WallSensors.read(run)
         axes = ("$t\\sqrt{g/H}$", "$p/\\rho gH$")
         found = []
         for name, own in zip(SENSORS, pressure, strict=False):
