@@ -53,6 +53,10 @@ class RollingTank(FreeSurface):
     amplitude: float = Field(default=4.0, gt=0, le=30, description="amplitude of the roll [degrees]")
     frequency: float = Field(default=0.4354, gt=0, description="angular frequency of the roll [√(g/H)]")
 
+    packing_relaxation: float = Field(
+        default=0.05, ge=0, le=1, description="share of a number density above the lattice's that a step takes off [-]"
+    )
+
     @property
     def default_until(self) -> float:
         """Three periods."""
