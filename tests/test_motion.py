@@ -208,6 +208,15 @@ def test_a_cylinder_that_is_let_go_has_the_acceleration_of_added_mass(tmp_path, 
     assert acceleration.passed, acceleration
 
 
+@pytest.mark.parametrize("sweeps", [8, 16, 40])
+def test_a_light_body_is_stable_however_many_sweeps_there_are(sweeps):
+    simulation = ConcentricRelease(density_ratio=0.02, resolution=8, projection_sweeps=sweeps).simulation(threads=1)
+    simulation.run_until(0.12)
+    rows = simulation.history()
+    acceleration = np.diff(rows["velocity"][:, 0, 1]) / rows["time_step"][1:]
+    assert np.abs(np.diff(acceleration[5:])).mean() < 0.005
+
+
 def test_a_free_body_moves_as_the_forces_on_it_say():
     """Its velocity is the integral of force over mass, and its way that of the velocity."""
     case = ConcentricRelease(density_ratio=2.0, resolution=10, scheme="isph")
