@@ -41,6 +41,16 @@ impl<const D: usize> BodyForce<D> {
         self.walls.get(i).copied().unwrap_or_else(Vector::zeros)
     }
 
+    /// The constant part.
+    pub fn constant(&self) -> Vector<D> {
+        self.constant
+    }
+
+    /// What a rule adds on particle `i`.
+    pub fn varying(&self, i: usize) -> Vector<D> {
+        self.field.get(i).copied().unwrap_or_else(Vector::zeros)
+    }
+
     /// That on particle `i`.
     #[inline]
     pub fn at(&self, i: usize) -> Vector<D> {

@@ -27,6 +27,7 @@
 
 use crate::base::Vector;
 use crate::base::error::{Error, Result, setting};
+use crate::forcing::BodyForce;
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::{Body, Boundary, Rigid, Settings};
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -36,6 +37,9 @@ const GRAIN: f64 = 1.0 / (1u64 << 30) as f64;
 
 /// Solids less deep than this [Δx] lie under the surface.
 const LAYER: f64 = 0.75;
+
+/// How far [Δx] from where its velocity takes it a body may be that a rule moves.
+const JUMP: f64 = 0.5;
 
 /// How much of the way to A the slow Ā goes in a step.
 const FOLLOWING: f64 = 0.1;
@@ -131,6 +135,7 @@ pub struct Motion<const D: usize> {
     members: Vec<(usize, usize)>,
     /// Lengths of the domain's periodic directions; zero of others.
     period: Vector<D>,
+    spacing: f64,
 }
 
 #[derive(Debug)]
@@ -144,6 +149,8 @@ struct Moving<const D: usize> {
     end: Pose,
     /// How far its particles are from its centre.
     radius: f64,
+    /// The body force of the step, if it is free.
+    body_force: Vector3<f64>,
     /// The fluid's mass in the layer Δx over its surface, and the moment of inertia of that for what pushes it as the body turns.
     layer: f64,
     layer_inertia: f64,
@@ -163,13 +170,13 @@ struct Shape<const D: usize> {
 impl<const D: usize> Default for Motion<D> {
     fn default() -> Self {
         let (bodies, place_of, shape, members) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { bodies, place_of, shape, members, period: Vector::zeros() }
+        Self { bodies, place_of, shape, members, period: Vector::zeros(), spacing: 0.0 }
     }
 }
 
 impl<const D: usize> Motion<D> {
     pub fn new(settings: &Settings) -> Self {
-        let mut motion = Self::default();
+        let mut motion = Self { spacing: settings.particle_spacing, ..Self::default() };
         for (index, body) in settings.bodies.iter().enumerate() {
             let moving = body.is_rigid();
             motion.place_of.push(moving.then_some(motion.bodies.len()));
@@ -182,6 +189,7 @@ impl<const D: usize> Motion<D> {
                     frame: Pose::default(),
                     end: Pose::default(),
                     radius: 0.0,
+                    body_force: Vector3::zeros(),
                     layer: 0.0,
                     layer_inertia: 0.0,
                 });
@@ -235,8 +243,8 @@ impl<const D: usize> Motion<D> {
             let arm = arm - self.period.zip_map(&arm, whole_periods);
             let back = |v: &Vector<D>, grain: f64| turned(&-start.angle, v).map(|x| (x / grain).round() * grain);
             *radius = radius.max(arm.norm());
+            // Not of unit length to the last bit: that could be nearer to other multiples.
             let normal = back(&particles.normal[i], GRAIN);
-            let normal = normal.try_normalize(0.0).unwrap_or(normal);
             let outer = particles.depth[i] < LAYER * settings.particle_spacing;
             self.shape.push(Shape { id: particles.id[i], body, arm: back(&arm, grain), normal, outer });
         }
@@ -252,7 +260,8 @@ impl<const D: usize> Motion<D> {
         for body in &mut self.bodies {
             if let Some(rigid) = body.rigid.as_ref().filter(|_| begins) {
                 let at_once = [rigid.added_mass, rigid.added_inertia];
-                body.start.respond::<D>(rigid, at_once, &settings.body_force, Vector3::zeros(), Vector3::zeros());
+                let constant = Vector3::from_fn(|k, _| settings.body_force.get(k).copied().unwrap_or(0.0));
+                body.start.respond::<D>(rigid, at_once, [constant * rigid.mass, Vector3::zeros()], 0.0);
                 body.start.follow(1.0);
             }
             (body.frame, body.end) = (body.start, body.start);
@@ -273,7 +282,17 @@ impl<const D: usize> Motion<D> {
             body.end = body.start.after::<D>(time_step);
         }
         self.tell(rule, time + fraction * time_step, Moment::Frame)?;
-        self.tell(rule, time + time_step, Moment::End)
+        self.tell(rule, time + time_step, Moment::End)?;
+        for body in self.bodies.iter().filter(|body| body.rigid.is_none()) {
+            let Moving { start, end, .. } = body;
+            let way = (start.velocity + end.velocity) * (0.5 * time_step);
+            let jump = (end.displacement - start.displacement - way).norm();
+            if jump > JUMP * self.spacing {
+                let problem = format!("jumps at time {time:.6}: a body comes {jump:.3} beside what its velocity says");
+                return Err(Error::Array { name: "motion", problem });
+            }
+        }
+        Ok(())
     }
 
     /// Ask the rule where the bodies are that it moves.
@@ -373,19 +392,35 @@ impl<const D: usize> Motion<D> {
         }
     }
 
+    /// Let free bodies feel the body force of a step: its mean over their particles.
+    pub fn feel(&mut self, force: &BodyForce<D>) {
+        if self.bodies.iter().all(|body| body.rigid.is_none()) {
+            return;
+        }
+        // In an order that does not depend on how particles are stored.
+        let mut felt: Vec<_> = self.members.iter().map(|&(i, shape)| (shape, force.varying(i))).collect();
+        felt.sort_unstable_by_key(|&(shape, _)| shape);
+        for (number, body) in self.bodies.iter_mut().enumerate() {
+            let own = || felt.iter().filter(|(shape, _)| self.shape[*shape].body == number).map(|(_, force)| force);
+            let mean = own().sum::<Vector<D>>() / own().count().max(1) as f64;
+            body.body_force = spatial(&(force.constant() + mean));
+        }
+    }
+
     /// The bodies are where the step has led to; `loads` are forces and torques of the fluid on each of the settings' bodies, and `reach` is
     /// how far the pressure travels in a step over Δx.
-    pub fn end(&mut self, body_force: &[f64], reach: f64, loads: impl Fn(usize) -> [Vector3<f64>; 2]) {
+    pub fn end(&mut self, time_step: f64, reach: f64, loads: impl Fn(usize) -> [Vector3<f64>; 2]) {
         for body in &mut self.bodies {
             body.start = body.end;
             if let Some(rigid) = &body.rigid {
                 let [force, torque] = loads(body.body as usize);
+                let acting = [force + body.body_force * rigid.mass, torque];
                 let (at_once, following) = if reach.is_finite() {
                     ([body.layer, body.layer_inertia].map(|layer| reach * layer), FOLLOWING)
                 } else {
                     ([rigid.added_mass, rigid.added_inertia], 1.0)
                 };
-                body.start.respond::<D>(rigid, at_once, body_force, force, torque);
+                body.start.respond::<D>(rigid, at_once, acting, 0.5 * time_step);
                 body.start.follow(following);
             }
         }
@@ -409,20 +444,20 @@ impl<const D: usize> Motion<D> {
 }
 
 impl Pose {
-    /// Accelerate a free body as the fluid's force and torque, and its own, ask for. The fluid answers at once with a mass and a moment of
-    /// inertia.
+    /// Accelerate a free body as force and torque, and its own, ask for. The fluid answers at once with a mass and a moment of inertia. Springs
+    /// and dampers act as they will after the time `ahead`, in the middle of the step: with those of its start, energy would be made.
     fn respond<const D: usize>(
         &mut self,
         rigid: &Rigid,
         [added_mass, added_inertia]: [f64; 2],
-        body_force: &[f64],
-        force: Vector3<f64>,
-        torque: Vector3<f64>,
+        [force, torque]: [Vector3<f64>; 2],
+        ahead: f64,
     ) {
         let Rigid { mass, inertia, force: own, stiffness, damping, free, .. } = rigid;
         let of = |values: &[f64]| Vector3::from_fn(|k, _| values.get(k).copied().unwrap_or(0.0));
-        let spring = of(stiffness).component_mul(&self.displacement) + of(damping).component_mul(&self.velocity);
-        let total = force + of(own) + of(body_force) * *mass - spring;
+        let spring = of(stiffness).component_mul(&(self.displacement + self.velocity * ahead));
+        let damper = of(damping).component_mul(&(self.velocity + self.acceleration * ahead));
+        let total = force + of(own) - spring - damper;
         let moves = |k: usize| k < D && free[k];
         let acceleration = (total + self.mean_acceleration * added_mass) / (mass + added_mass);
         self.acceleration = Vector3::from_fn(|k, _| if moves(k) { acceleration[k] } else { 0.0 });
@@ -433,11 +468,14 @@ impl Pose {
         };
         let inertia = turn * own_axes * turn.inverse();
         let gyroscopic = if D == 2 { Vector3::zeros() } else { self.spin.cross(&(inertia * self.spin)) };
-        let twist = torque - gyroscopic + self.mean_angular_acceleration * added_inertia;
-        let turning =
-            (inertia + Matrix3::identity() * added_inertia).try_inverse().map_or_else(Vector3::zeros, |i| i * twist);
-        let turns = |k: usize| if D == 2 { k == 2 && free[2] } else { free[3 + k] };
-        self.angular_acceleration = Vector3::from_fn(|k, _| if turns(k) { turning[k] } else { 0.0 });
+        let mut twist = torque - gyroscopic + self.mean_angular_acceleration * added_inertia;
+        let mut inertia = inertia + Matrix3::identity() * added_inertia;
+        // About the other axes what holds the body answers any torque.
+        for k in (0..3).filter(|&k| if D == 2 { k < 2 || !free[2] } else { !free[3 + k] }) {
+            inertia.row_mut(k).fill(0.0);
+            (inertia[(k, k)], twist[k]) = (1.0, 0.0);
+        }
+        self.angular_acceleration = inertia.try_inverse().map_or_else(Vector3::zeros, |inverse| inverse * twist);
     }
 
     fn follow(&mut self, share: f64) {

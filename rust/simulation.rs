@@ -186,6 +186,7 @@ impl<const D: usize> Simulation<D> {
             self.prepared = false;
             return Err(error);
         }
+        flow.motion.feel(&flow.body_force);
 
         let solved = scheme.solve(step, flow);
         if let Some(symptom) = breakdown::find(step.settings, &flow.particles, &flow.frame, time_step) {
@@ -210,7 +211,7 @@ impl<const D: usize> Simulation<D> {
         self.end_step(time_step);
         let loads = &report.loads;
         let reach = self.scheme.reach(time_step) / self.settings.particle_spacing;
-        self.flow.motion.end(&self.settings.body_force, reach, |body| loads[body].total());
+        self.flow.motion.end(time_step, reach, |body| loads[body].total());
         report.poses = self.flow.motion.poses();
         report.clock = self.clock;
         report.counts = self.flow.particles.counts();

@@ -159,6 +159,55 @@ fn a_heavy_body_obeys_newton() {
     assert_relative_eq!(last.angle.z, 0.5, max_relative = 0.02);
 }
 
+/// A spring makes no energy, however long the steps are, and a rule for the body force acts on a free body as the constant one does.
+#[test]
+fn a_heavy_body_keeps_its_energy_and_feels_the_body_force() {
+    let (mass, stiffness) = (500.0, 500.0 * (TAU / 0.5f64).powi(2));
+    let rigid = |stiffness: f64| {
+        json!({
+            "mass": mass, "inertia": [15.0], "force": [0.0, -0.02 * stiffness], "stiffness": [stiffness, stiffness],
+            "damping": [0.0, 0.0], "free": [true, true, true], "added_mass": 0.3, "added_inertia": 0.01,
+        })
+    };
+    let (value, particles) = body_in_fluid(rigid(stiffness), &[("courant", json!(0.1))]);
+    let mut swinging = simulation(&value, &particles, None);
+    swinging.advance_until(1.5, None).expect("stable");
+    let history = swinging.take_history();
+    let highest = |period: f64| {
+        let within = history.iter().filter(|report| (period..period + 0.5).contains(&report.clock.time));
+        within.map(|report| report.poses[0].displacement.y + 0.02).fold(0.0, f64::max)
+    };
+    // With the spring of a step's start the amplitude would grow by ω² Δt/4 of it a time.
+    assert_relative_eq!(highest(1.0), 0.02, max_relative = 0.05);
+
+    let (mut value, particles) = body_in_fluid(rigid(0.0), &[]);
+    let mut forced = simulation(&value, &particles, None);
+    forced.forcing.body_force = Some(Box::new(|position, _| Ok(vec![Vector::from([0.5, 0.0]); position.len()])));
+    value["body_force"] = json!([0.5, 0.0]);
+    let mut constant = simulation(&value, &particles, None);
+    for simulation in [&mut forced, &mut constant] {
+        simulation.advance_until(0.2, None).expect("stable");
+        let (pose, time) = (simulation.poses()[0], simulation.clock().time);
+        assert_relative_eq!(pose.velocity.x, 0.5 * time, max_relative = 0.05);
+    }
+}
+
+/// A run that goes on from the particles and poses of another has the bits of that, normals at all angles among them.
+#[test]
+fn the_shape_is_that_of_the_particles_to_the_last_bit() {
+    let (value, particles) = body_in_fluid(Value::Null, &[]);
+    let mut whole = simulation(&value, &particles, told(swing));
+    for _ in 0..3 {
+        whole.advance(1, None).expect("stable");
+        let mut again =
+            Simulation::new(common::parse(&value), whole.particles().clone(), whole.clock(), Some(1)).expect("valid");
+        again.forcing.motion = told(swing);
+        again.advance(1, None).expect("stable");
+        whole.advance(1, None).expect("stable");
+        assert_eq!(solids(again.particles()), solids(whole.particles()));
+    }
+}
+
 /// What begins to move drags fluid along, as an array of discs does.
 #[test]
 fn the_fluid_answers_with_the_mass_that_is_dragged_along() {
@@ -184,19 +233,16 @@ fn the_fluid_answers_with_the_mass_that_is_dragged_along() {
     }
 }
 
-/// In space a free body that turns about none of its principal axes tumbles, and keeps energy and angular momentum.
-#[test]
-fn a_body_in_space_tumbles() {
+/// A heavy ball in a periodic box in space, in a fluid that makes no difference.
+fn ball_in_space(inertia: [f64; 9], free: [bool; 6]) -> Simulation<3> {
     let spacing = 1.0 / 10.0;
     let mut value = common::settings_value::<3>(spacing, "periodic");
     (value["kinematic_viscosity"], value["wall_pressure"], value["wall_velocity"]) =
         (json!(1e-6), json!("linear"), json!("adami"));
     (value["time_step"], value["max_iterations"]) = (json!(2e-3), json!(1));
-    let inertia = [1000.0, 2000.0, 3000.0];
     value["bodies"] = json!([{"name": "body", "velocity": null, "moves": true, "center": [0.5, 0.5, 0.5], "rigid": {
-        "mass": 1e4, "inertia": [inertia[0], 0, 0, 0, inertia[1], 0, 0, 0, inertia[2]], "force": [0.0, 0.0, 0.0],
-        "stiffness": [0.0, 0.0, 0.0], "damping": [0.0, 0.0, 0.0], "free": [true, true, true, true, true, true],
-        "added_mass": 0.1, "added_inertia": 0.01,
+        "mass": 1e4, "inertia": inertia, "force": [0.0, 0.0, 0.0],
+        "stiffness": [0.0, 0.0, 0.0], "damping": [0.0, 0.0, 0.0], "free": free, "added_mass": 0.1, "added_inertia": 0.01,
     }}]);
     let mut particles = common::particles(common::lattice::<3>(10, 0.0));
     for i in 0..particles.real {
@@ -206,7 +252,14 @@ fn a_body_in_space_tumbles() {
             (particles.normal[i], particles.depth[i]) = (arm.normalize(), 0.26 - arm.norm());
         }
     }
-    let mut simulation = Simulation::<3>::new(common::parse(&value), particles, Clock::default(), Some(2)).expect("valid");
+    Simulation::<3>::new(common::parse(&value), particles, Clock::default(), Some(2)).expect("valid")
+}
+
+/// In space a free body that turns about none of its principal axes tumbles, and keeps energy and angular momentum.
+#[test]
+fn a_body_in_space_tumbles() {
+    let inertia = [1000.0, 2000.0, 3000.0];
+    let mut simulation = ball_in_space([inertia[0], 0.0, 0.0, 0.0, inertia[1], 0.0, 0.0, 0.0, inertia[2]], [true; 6]);
     let spin = Vector3::new(0.02, 3.0, 0.02);
     simulation.set_poses(&[Pose { spin, ..Pose::default() }]).expect("one body");
     simulation.advance_until(0.4, None).expect("stable");
@@ -221,6 +274,19 @@ fn a_body_in_space_tumbles() {
     let euler = [grown.cosh() - 3f64.sqrt() * grown.sinh(), grown.cosh() - grown.sinh() / 3f64.sqrt()].map(|x| 0.02 * x);
     assert_relative_eq!(own.x, euler[0], epsilon = 5e-4);
     assert_relative_eq!(own.z, euler[1], epsilon = 5e-4);
+}
+
+/// On an axle it goes on turning, though it is not balanced: the axle answers what would make it tumble.
+#[test]
+fn a_body_on_an_axle_keeps_turning() {
+    let inertia = [1000.0, 0.0, 300.0, 0.0, 2000.0, 400.0, 300.0, 400.0, 2500.0];
+    let mut simulation = ball_in_space(inertia, [true, true, true, false, false, true]);
+    let spin = Vector3::z() * 3.0;
+    simulation.set_poses(&[Pose { spin, ..Pose::default() }]).expect("one body");
+    simulation.advance_until(0.2, None).expect("stable");
+    let pose = simulation.poses()[0];
+    assert_relative_eq!(pose.spin, spin, epsilon = 1e-3);
+    assert_relative_eq!(pose.angle, spin * simulation.clock().time, epsilon = 1e-3);
 }
 
 /// What cannot be is refused, and says what.
@@ -242,6 +308,7 @@ fn motions_that_cannot_be_are_refused() {
     for (key, wrong, told) in [
         ("mass", json!(0.0), "rigid.mass"),
         ("inertia", json!([1.0, 2.0]), "rigid.inertia"),
+        ("inertia", json!([-1.0]), "rigid.inertia"),
         ("free", json!([true]), "rigid.free"),
         ("added_mass", json!(-1.0), "rigid.added_mass"),
         ("force", json!([1.0]), "rigid.force"),
@@ -254,6 +321,21 @@ fn motions_that_cannot_be_are_refused() {
         let (value, _) = body_in_fluid(rigid, &[]);
         let error = alsph::Settings::from_json(&value.to_string()).expect_err("wrong").to_string();
         assert!(error.contains(told), "{error}");
+    }
+    let jump = told(|time| Pose { displacement: Vector3::x() * if time > 0.02 { 0.05 } else { 0.0 }, ..Pose::default() });
+    let error = simulation(&value, &particles, jump).advance_until(1.0, None).expect_err("it jumps").to_string();
+    assert!(error.contains("motion`: jumps at time 0.0"), "{error}");
+    for wrong in [[1.0, 5.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], [1.0, 2.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0, 1.0]] {
+        let rigid = json!({
+            "mass": 1.0, "inertia": wrong, "force": [0.0, 0.0, 0.0], "stiffness": [0.0, 0.0, 0.0], "damping": [0.0, 0.0, 0.0],
+            "free": [true, true, true, true, true, true], "added_mass": 0.0, "added_inertia": 0.0,
+        });
+        let mut value = common::settings_value::<3>(0.1, "periodic");
+        (value["wall_pressure"], value["wall_velocity"]) = (json!("linear"), json!("adami"));
+        value["bodies"] =
+            json!([{"name": "body", "velocity": null, "moves": true, "center": [0.5, 0.5, 0.5], "rigid": rigid}]);
+        let error = alsph::Settings::from_json(&value.to_string()).expect_err("no tensor").to_string();
+        assert!(error.contains("rigid.inertia") && error.contains("symmetric"), "{error}");
     }
     let (value, _) = body_in_fluid(Value::Null, &[("wall_pressure", json!("paper"))]);
     let error = alsph::Settings::from_json(&value.to_string()).expect_err("the paper's walls do not move").to_string();

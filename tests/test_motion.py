@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from alsph import cases
 from alsph.cases import ConcentricRelease, Cylinder, OscillatingCylinder, SettlingSphere, TowedCylinder
+from alsph.config import Config
 from alsph.engine.motion import poses
 from alsph.errors import ConfigError, SolverError
 from alsph.geometry.domain import SolidBody
@@ -150,6 +151,32 @@ def test_runs_with_another_motion_are_other_runs():
     assert first == again != other
 
 
+class Waving(Cylinder):
+    """A cylinder that a function moves which gives a row for each body."""
+
+    def motion(self, position, time):
+        assert position.shape == (1, 2)
+        return np.array([[0.0, 0.1 * np.sin(time)]])
+
+
+def test_a_rule_that_gives_a_row_for_each_body_is_asked_of_bodies_alone():
+    assert digest(Config(Waving(**SMALL))) != digest(Config(Cylinder(**SMALL)))
+
+
+def test_a_motion_that_is_known_from_a_time_on_or_jumps_is_told_of():
+    with pytest.raises(ConfigError, match=r"motion: is not finite at t\* = -0.00"):
+        Cylinder(**SMALL, body_motion="sqrt(t), 0").simulation(threads=1).advance(1)
+    with pytest.raises(ConfigError, match=r"`motion`: jumps at time 0.0"):
+        Cylinder(**SMALL, body_motion="0.5*(1 + tanh((t - 0.03)*1e4)), 0").simulation(threads=1).advance(100)
+
+
+def test_a_run_that_begins_with_one_whose_body_has_moved_is_told_so(tmp_path):
+    case = Cylinder(**SMALL, body_motion="0, 0.1*t")
+    source = case.run(tmp_path / "run", until=0.05, progress=False)
+    with pytest.warns(RuntimeWarning, match="its bodies have moved, and here begin where they are drawn"):
+        case.simulation(initial_run=source.path)
+
+
 # What is free
 
 
@@ -163,6 +190,7 @@ def test_runs_with_another_motion_are_other_runs():
         ({"force": (1,)}, "rigid: force = (1,): must be 2 finite numbers"),
         ({"free": (True,)}, "rigid: free = (True,): must be 2 directions and 1 axes, True or False each"),
         ({"free": (1, 1, 1)}, "rigid: free = (1, 1, 1): must be"),
+        ({"free": True}, "rigid: free = True: must be"),
         ({"added_mass": -1.0}, "rigid: added_mass = -1.0: must be a number"),
     ],
 )
@@ -178,6 +206,15 @@ def test_a_cylinder_that_is_let_go_has_the_acceleration_of_added_mass(tmp_path, 
     run = case.run(tmp_path / "run", until=0.11, progress=False)
     (acceleration,) = run.measures
     assert acceleration.passed, acceleration
+
+
+@pytest.mark.parametrize("sweeps", [8, 16, 40])
+def test_a_light_body_is_stable_however_many_sweeps_there_are(sweeps):
+    simulation = ConcentricRelease(density_ratio=0.02, resolution=8, projection_sweeps=sweeps).simulation(threads=1)
+    simulation.run_until(0.12)
+    rows = simulation.history()
+    acceleration = np.diff(rows["velocity"][:, 0, 1]) / rows["time_step"][1:]
+    assert np.abs(np.diff(acceleration[5:])).mean() < 0.005
 
 
 def test_a_free_body_moves_as_the_forces_on_it_say():
@@ -233,6 +270,11 @@ def test_the_work_of_a_body_that_moves_is_in_the_energy_budget(tmp_path):
     assert run.ledger.power[1:] == pytest.approx(at)
     names = [measure.name for measure in run.measures]
     assert "inertia coefficient of Morison" in names and len(run.profiles) == 1
+
+
+def test_a_sphere_as_heavy_as_the_fluid_is_refused():
+    with pytest.raises(ConfigError, match="density_ratio = 1: the sphere neither sinks nor rises"):
+        SettlingSphere(density_ratio=1)
 
 
 def test_a_quarter_of_a_sphere_settles_straight(tmp_path):

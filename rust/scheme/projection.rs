@@ -46,14 +46,14 @@ pub struct Sweeps {
     pub(super) relaxation: f64,
     /// One over the largest eigenvalue of the compact Laplacian: so much of it takes the shortest waves off.
     shortest: f64,
-    /// Whether there are any.
-    are_taken: bool,
+    /// Σ 1/weight of all.
+    together: f64,
 }
 
 impl Sweeps {
-    /// The square of how far a sweep carries the pressure.
+    /// The square of how far all sweeps carry the pressure, each of which spreads it as diffusion does.
     pub fn reach_squared(self) -> f64 {
-        if self.are_taken { self.relaxation } else { 0.0 }
+        self.relaxation * self.together
     }
 
     pub fn new(settings: &Settings, largest: Eigenvalues) -> Self {
@@ -61,7 +61,7 @@ impl Sweeps {
         Self {
             relaxation: area / (EIGENVALUE_MARGIN * largest.projection),
             shortest: area / largest.laplacian,
-            are_taken: settings.projection_sweeps > 0,
+            together: (0..settings.projection_sweeps).map(|sweep| 1.0 / weight(settings, sweep)).sum(),
         }
     }
 }

@@ -82,6 +82,10 @@ impl Rigid {
         if self.inertia.len() != turns * turns || !(0..turns).all(|k| positive(self.inertia[k * turns + k])) {
             return refuse("inertia", "must be a positive number in 2-D, the nine of a tensor in 3-D");
         }
+        let tensor = nalgebra::DMatrix::from_row_slice(turns, turns, &self.inertia);
+        if tensor != tensor.transpose() || tensor.cholesky().is_none() {
+            return refuse("inertia", "must be a symmetric tensor with positive principal moments");
+        }
         if self.free.len() != dimensions + turns {
             return refuse("free", "must say of each direction and axis whether the body can move so");
         }

@@ -104,6 +104,13 @@ class Driven(Dimensional):
         return told or [name for name in self.coefficient_bodies if name not in free]
 
     @property
+    def moved_centres(self) -> FloatArray:
+        """Their centres at the start (b, d) [D]."""
+        moved = self.moved_bodies
+        centres = [body.center for body in self.checked_bodies if body.name in moved]
+        return np.array(centres, float).reshape(-1, self.space_dimensions)
+
+    @property
     def coefficient_bodies(self) -> list[str]:
         """Names of the bodies that drag and lift are those of, all together."""
         return []

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from alsph import reference
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
+from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, lattice, symmetric_centres
 from alsph.geometry.packing import pack
@@ -51,6 +52,12 @@ class SettlingSphere(Case):
     density_ratio: float = Field(default=2.0, gt=0, description="density of the sphere over that of the fluid, s [-]")
     height: float = Field(default=14.0, gt=5, description="height of the column [D]")
     width: float = Field(default=6.0, gt=2, description="width of the column [D]")
+
+    @model_validator(mode="after")
+    def _settles(self) -> Self:
+        if self.density_ratio == 1:
+            raise ConfigError("density_ratio = 1: the sphere neither sinks nor rises")
+        return self
 
     @property
     def default_until(self) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from alsph.arrays import FloatArray
 from alsph.engine.prescribed import Prescription, Rule, asked
+from alsph.errors import ConfigError
 
 INTERVAL = 1e-3
 """Between the times of which velocities and accelerations are formed, to fourth order [D/U]."""
@@ -77,6 +78,9 @@ def _placed(rule: Rule, centres: FloatArray, time: float) -> tuple[FloatArray, F
     """Return displacement and rotation vector, three components each."""
     values = asked("motion", rule, centres, time)
     assert values is not None
+    if not np.isfinite(values).all():
+        asked_for = f"it is asked for up to {2 * INTERVAL:g} before and after each step"
+        raise ConfigError(f"motion: is not finite at t* = {time:.6g}; {asked_for}")
     dimensions = centres.shape[1]
     way, turn = np.zeros((len(centres), 3)), np.zeros((len(centres), 3))
     way[:, :dimensions] = values[:, :dimensions]

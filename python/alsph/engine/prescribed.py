@@ -133,8 +133,11 @@ def _difference(name: str, rule: Rule | None, then: Prescription | None) -> str:
     return f"another {what}: at t* = {then.time:.6g} its values differ by up to {change:.3g}"
 
 
-def fingerprint(name: str, rule: Rule, domain: Domain, until: float) -> str:
-    """Return a hash of what a rule gives at points of the domain, or its inlets, and times up to `until` [D/U]."""
+def fingerprint(name: str, rule: Rule, domain: Domain, until: float, centres: FloatArray | None = None) -> str:
+    """Return a hash of what a rule gives at times up to `until` [D/U] and at points of the domain or its inlets.
+
+    With `centres` (b, d), of bodies that a motion moves, what it gives there.
+    """
     total = hashlib.sha256()
     shares = (np.arange(SAMPLES) + 0.5) / SAMPLES
     lower, upper = np.array(domain.lower), np.array(domain.upper)
@@ -145,9 +148,9 @@ def fingerprint(name: str, rule: Rule, domain: Domain, until: float) -> str:
             [np.array([plane]) if k == axis else values for k, values in enumerate(axes)]
             for axis, _, plane in domain.inlets()
         ]
-    for grid in grids:
+    for points in [lattice(*grid) for grid in grids] if centres is None else [centres]:
         for share in (np.arange(SAMPLES) * 0.618034) % 1:  # no multiples of a period
-            values = asked(name, rule, lattice(*grid), float(share * until))
+            values = asked(name, rule, points, float(share * until))
             # In single precision, which no rounding of another mathematical library reaches.
             total.update(b"" if values is None else np.ascontiguousarray(values, np.float32).tobytes())
     return total.hexdigest()

@@ -78,7 +78,7 @@ class Rigid:
         for name in ("force", "stiffness", "damping"):
             given = getattr(self, name)
             vectors[name] = self._vector(name, given if len(np.atleast_1d(given)) else [0.0] * dimensions, dimensions)
-        free = list(self.free) or [True] * (dimensions + turns)
+        free = list(np.atleast_1d(np.asarray(self.free, object))) or [True] * (dimensions + turns)
         if len(free) != dimensions + turns or not all(isinstance(each, bool | np.bool_) for each in free):
             told = f"must be {dimensions} directions and {turns} axes, True or False each"
             raise ConfigError(f"rigid: free = {shown(self.free)}: {told}")

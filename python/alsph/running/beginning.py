@@ -55,6 +55,8 @@ def remarks(case: Case, run: Run) -> list[str]:
     if run.status != "finished":
         time = run.info.get("time", float("nan"))
         found.append(f"initial_run = '{run.path}': has not finished, it is {run.status} at t* = {time:.4g}")
+    if any(values[-1] for name, values in run.history.items() if "_displacement_" in name and len(values)):
+        found.append(f"initial_run = '{run.path}': its bodies have moved, and here begin where they are drawn")
     return found
 
 

@@ -224,7 +224,8 @@ def digest(configuration: Config, *without: str) -> str:
     if initial is not None:
         tables["run"]["initial_run"] = beginning.flow_sha256(Run(initial))
     for name, rule in case.rules.items():
-        tables[name] = fingerprint(name, rule, case.checked_domain, configuration.until)
+        centres = case.moved_centres if name == "motion" else None
+        tables[name] = fingerprint(name, rule, case.checked_domain, configuration.until, centres)
     return hashlib.sha256(json.dumps(tables, sort_keys=True).encode()).hexdigest()
 
 
