@@ -27,7 +27,6 @@
 
 use crate::base::Vector;
 use crate::base::error::{Error, Result, setting};
-use crate::forcing::BodyForce;
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::{Body, Boundary, Rigid, Settings};
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -392,18 +391,18 @@ impl<const D: usize> Motion<D> {
         }
     }
 
-    /// Let free bodies feel the body force of a step: its mean over their particles.
-    pub fn feel(&mut self, force: &BodyForce<D>) {
+    /// Let free bodies feel the body force of a step: what is `constant` of it, and the mean of the rest over their particles.
+    pub fn feel(&mut self, constant: Vector<D>, varying: impl Fn(usize) -> Vector<D>) {
         if self.bodies.iter().all(|body| body.rigid.is_none()) {
             return;
         }
         // In an order that does not depend on how particles are stored.
-        let mut felt: Vec<_> = self.members.iter().map(|&(i, shape)| (shape, force.varying(i))).collect();
+        let mut felt: Vec<_> = self.members.iter().map(|&(i, shape)| (shape, varying(i))).collect();
         felt.sort_unstable_by_key(|&(shape, _)| shape);
         for (number, body) in self.bodies.iter_mut().enumerate() {
             let own = || felt.iter().filter(|(shape, _)| self.shape[*shape].body == number).map(|(_, force)| force);
             let mean = own().sum::<Vector<D>>() / own().count().max(1) as f64;
-            body.body_force = spatial(&(force.constant() + mean));
+            body.body_force = spatial(&(constant + mean));
         }
     }
 

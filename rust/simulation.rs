@@ -186,7 +186,7 @@ impl<const D: usize> Simulation<D> {
             self.prepared = false;
             return Err(error);
         }
-        flow.motion.feel(&flow.body_force);
+        flow.motion.feel(flow.body_force.constant(), |i| flow.body_force.varying(i));
 
         let solved = scheme.solve(step, flow);
         if let Some(symptom) = breakdown::find(step.settings, &flow.particles, &flow.frame, time_step) {
