@@ -25,6 +25,7 @@ FIELDS = {
     "nozzle": "velocity",
     "pressure_jump": "pressure",
     "sloshing": "pressure",
+    "rolling_tank": "pressure",
     "rotating_patch": "pressure",
     "standing_wave": "velocity",
     "still_water": "pressure",
