@@ -304,9 +304,11 @@ def test_what_cannot_be_is_told_when_the_case_is_made(name, parameters, message)
 def test_a_side_that_a_free_surface_does_not_know_is_refused():
     class Walled(cases.StillWater):
         def domain(self):
-            return Domain([0, 0], [1, 2], [("none", "slip"), ("slip", "air")])
+            return Domain([0, 0], [1, 2], [("outlet", "slip"), ("slip", "air")])
 
-    with pytest.raises(ConfigError, match="a side is 'none'; with a free surface take slip or periodic or air"):
+    with pytest.raises(
+        ConfigError, match="a side is 'outlet'; with a free surface take slip or periodic or air or none"
+    ):
         Walled().build()
 
 

@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 from alsph import config
+from alsph.cases import Cylinder
 from alsph.config import Config, RunSettings
 from alsph.errors import RunFolderError
 from alsph.folder import vtkhdf
@@ -129,7 +130,7 @@ def test_history_and_samples_are_cut_at_the_checkpoint(folder):
         append_surface(folder, 0.1 * step, {"angle": np.array([0.0, 90.0])}, [1.0, -step])
     with (folder.path / "history.csv").open("a") as file:
         file.write("4,")
-    folder.truncate(2, 0.2, [SurfacePressure(circle(0.5, 72), 0.1)])
+    folder.truncate(2, 0.2, [SurfacePressure(circle(0.5, 72), 0.1, Cylinder(resolution=8))])
     assert (folder.path / "history.csv").read_text() == "step,time\n1,0.1\n2,0.2\n"
     with h5py.File(folder.path / "surface.h5") as file:
         assert file["time"][:] == pytest.approx([0.1, 0.2])

@@ -110,11 +110,11 @@ def test_finer_resolutions_may_go_on_with_the_flow_of_coarser_ones(tmp_path):
 def test_a_validation_that_was_cut_goes_on(finished, tmp_path, monkeypatch, lost):
     record, calls = Driver._record, []
 
-    def cut(self):
+    def cut(self, reporter):
         calls.append(1)
         if len(calls) > 1:
             raise KeyboardInterrupt("stopped")
-        return record(self)
+        return record(self, reporter)
 
     with monkeypatch.context() as patch:
         patch.setattr("alsph.running.driver.Driver._record", cut)

@@ -174,8 +174,9 @@ impl<const D: usize> SurfaceAlsph<D> {
         let pressure = &particles.pressure;
         let shown = |s: usize| {
             let mean = shepard(settings, &frame.stencil, s, |j, r_sj| {
-                let force = if surface.is_at_surface(j) { Vector::zeros() } else { body_force.at(j) };
-                [pressure[j] + ((force - body_force.acceleration_of_wall(s)) * settings.density).dot(&r_sj)]
+                // Nothing is known of the pressure beyond what is at the surface, which may be falling.
+                let known = if surface.is_at_surface(j) { 0.0 } else { settings.density };
+                [pressure[j] + (body_force.at(j) - body_force.acceleration_of_wall(s)).dot(&r_sj) * known]
             });
             let [p] = mean.unwrap_or([0.0]);
             (s, if self.own.tension { p } else { p.max(0.0) })

@@ -41,6 +41,14 @@ PLACE = 0.029 / DEPTH
 
 SOURCE = "experiment, Kleefsman et al. (2005)"
 
+WINDOWS = ((1.6, 3.0), (3.0, 5.0))
+"""Times that pressures are averaged between [√(H/g)]."""
+
+
+def mean_name(sensor: str, window: tuple[float, float]) -> str:
+    """Return the name of the measure of the mean pressure at a sensor."""
+    return f"pressure at {sensor}, mean over t = {window[0]:g} to {window[1]:g}, ρgH"
+
 
 class DamBreakObstacle(FreeSurface):
     """A column of water H high that is let go in a tank with a box on its floor (Kleefsman et al. 2005), 3-D.
@@ -55,7 +63,8 @@ class DamBreakObstacle(FreeSurface):
     velocity_max: ClassVar[float] = 2.5
     later_names: ClassVar[tuple[str, ...]] = (
         *FreeSurface.later_names,
-        "time of arrival",
+        *(f"time of arrival at {name}, √(H/g)" for name in SENSORS),
+        *(mean_name(name, window) for name in SENSORS for window in WINDOWS),
         *(f"pressure at {name}" for name in SENSORS),
     )
 
@@ -145,10 +154,10 @@ class DamBreakObstacle(FreeSurface):
             found = [_arrival(time, own), _arrival(at, measured)]
             if len(time) and time[-1] > 2.0:
                 rows.append(Measure(f"time of arrival at {name}, √(H/g)", found[0], found[1], 0.05, SOURCE))
-            for start, end in ((1.6, 3.0), (3.0, 5.0)):
+            for start, end in WINDOWS:
                 if len(time) and time[-1] >= end:
                     means = [_mean(time, own, start, end), _mean(at, measured, start, end)]
-                    label = f"pressure at {name}, mean over t = {start:g} to {end:g}, ρgH"
+                    label = mean_name(name, (start, end))
                     rows.append(Measure(label, means[0], means[1], 0.15, SOURCE))
         return rows
 

@@ -32,7 +32,11 @@ class FloatingBox(FreeSurface):
 
     name: ClassVar[str] = "floating_box"
     title: ClassVar[str] = "a box that floats in a tank"
-    later_names: ClassVar[tuple[str, ...]] = (*FreeSurface.later_names, "mean force", "turn", "heave")
+    later_names: ClassVar[tuple[str, ...]] = (
+        "mean force of the water over the weight",
+        "turn of the box, rad",
+        "heave",
+    )
 
     tank_length: float = Field(default=3.0, gt=0, description="length of the tank [H]")
     tank_height: float = Field(default=2.0, gt=1, description="height above which spray is lost [H]")

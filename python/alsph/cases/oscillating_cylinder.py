@@ -33,7 +33,11 @@ class OscillatingCylinder(MovingCylinder):
 
     name: ClassVar[str] = "oscillating_cylinder"
     title: ClassVar[str] = "a cylinder that oscillates in a fluid at rest"
-    later_names: ClassVar[tuple[str, ...]] = ("largest force coefficient", *MORISON, "force coefficient over")
+    later_names: ClassVar[tuple[str, ...]] = (
+        "largest force coefficient",
+        *MORISON,
+        "force coefficient over the last period",
+    )
 
     keulegan_carpenter: float = Field(default=5.0, gt=0, description="Keulegan-Carpenter number KC = UT/D [-]")
 

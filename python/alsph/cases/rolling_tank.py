@@ -46,7 +46,10 @@ class RollingTank(FreeSurface):
 
     name: ClassVar[str] = "rolling_tank"
     title: ClassVar[str] = "water in a tank that rolls"
-    later_names: ClassVar[tuple[str, ...]] = ("swing of the pressure at ", "pressure at ")
+    later_names: ClassVar[tuple[str, ...]] = (
+        *(f"swing of the pressure at {name}, ρgH" for name in SENSORS),
+        *(f"pressure at {name}" for name in SENSORS),
+    )
 
     tank_length: float = Field(default=1.978, gt=0, description="length of the tank [H]")
     tank_height: float = Field(default=1.333, gt=1, description="height of the tank, whose top is open [H]")
@@ -128,11 +131,11 @@ class RollingTank(FreeSurface):
         """Return by how much the pressure swings at the sensors after the first period, beside the experiment."""
         time, pressure = WallSensors.read(run)
         period = 2 * np.pi / self.frequency
-        if not len(time) or time[-1] < 2 * period:
+        if not len(time):
             return []
         rows = []
         for name, own in zip(SENSORS, pressure, strict=False):
-            swings = [_swing(time, own, period)]
+            swings = [_swing(time, own, period) if time[-1] > 2 * period else np.nan]
             swings.append(_swing(*_measured(name), period) if self._is_the_experiment else np.nan)
             rows.append(Measure(f"swing of the pressure at {name}, ρgH", swings[0], swings[1], 0.15, SOURCE))
         return rows

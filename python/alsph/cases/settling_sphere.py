@@ -46,6 +46,12 @@ class SettlingSphere(Case):
     settles: ClassVar[bool] = False
     picture_axis: ClassVar[str] = "y"
     velocity_max: ClassVar[float] = 1.5
+    later_names: ClassVar[tuple[str, ...]] = (
+        "settling velocity over the last two diameters",
+        "Reynolds number of the sphere",
+        "drag coefficient",
+        "velocity of the sphere",
+    )
 
     reynolds: float = Field(default=90.8, gt=0, description="Galileo number UD/ν, U = √(|s - 1| gD) [-]")
     resolution: int = Field(default=10, ge=8, description="particles per diameter, D/Δx [-]")
