@@ -93,7 +93,9 @@ impl<const D: usize> Flow<D> {
         motion.place(Moment::End, frame.images.real(&mut position), &mut particles.normal);
         frame.images.fill_positions(&mut position);
         particles.position = position;
-        frame.images.fill(&mut particles.normal);
+        if !motion.is_none() {
+            frame.images.fill(&mut particles.normal);
+        }
     }
 }
 

@@ -96,7 +96,9 @@ impl<const D: usize> Frame<D> {
             motion.place(Moment::Frame, self.images.real(&mut position), &mut particles.normal);
             self.images.fill_positions(&mut position);
             particles.position = position;
-            self.images.fill(&mut particles.normal);
+            if !motion.is_none() {
+                self.images.fill(&mut particles.normal);
+            }
         }
         self.expected.clear();
         if lasts {
