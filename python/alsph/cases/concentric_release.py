@@ -11,15 +11,12 @@ from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
 from alsph.cases.base import Case
 from alsph.geometry.domain import Domain, SolidBody
-from alsph.geometry.lattice import lattice, symmetric_centres
-from alsph.geometry.packing import pack
 from alsph.geometry.particles import Kind, join, particles
 from alsph.geometry.rigid import Rigid
 from alsph.geometry.solids import cylinder_rings
-from alsph.geometry.volume import Volume
+from alsph.geometry.volume import ring_of_fluid
 from alsph.symbols import Symbols
 
 RADIUS = 0.5
@@ -89,23 +86,9 @@ class ConcentricRelease(Case):
         spacing, layers = self.particle_spacing, self.support_layers
         inner = cylinder_rings(RADIUS, spacing, layers)
         outer = cylinder_rings(self.vessel / 2, spacing, layers, side=-1)
-        fluid = self._fluid(np.concatenate([inner.position, outer.position]))
+        solid = np.concatenate([inner.position, outer.position])
+        fluid = ring_of_fluid(RADIUS, self.vessel / 2, self.resolution, solid)
         return join(particles(Kind.FLUID, fluid, 0.0), inner.particles(), outer.particles(body=1))
-
-    def _fluid(self, solid: FloatArray) -> FloatArray:
-        """Return as many particles (n, 2) as the ring has room for."""
-
-        def height(points: FloatArray) -> FloatArray:
-            radius = np.hypot(*points.T)
-            return np.asarray(np.minimum(self.vessel / 2 - radius, radius - RADIUS))
-
-        count = math.ceil(self.vessel * self.resolution - 1e-6)
-        square = (count * self.particle_spacing) ** 2
-        corner = np.full(2, count * self.particle_spacing / 2)
-        cells = lattice(*[symmetric_centres(count, self.particle_spacing)] * 2)
-        return pack(
-            cells, Volume(height, -corner, corner, square - self.fluid_volume(), 1.0), solid, self.particle_spacing
-        )
 
     @property
     def added_mass_coefficient(self) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -16,11 +15,9 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
 from alsph.geometry.domain import Domain, SolidBody
-from alsph.geometry.lattice import lattice, symmetric_centres
-from alsph.geometry.packing import pack
 from alsph.geometry.particles import Kind, join, particles
 from alsph.geometry.solids import cylinder_rings
-from alsph.geometry.volume import Volume
+from alsph.geometry.volume import ring_of_fluid
 
 TERMS = 60
 """Terms of the series; those that are left out have decayed after t* = 1e-3 Re."""
@@ -74,25 +71,13 @@ class TaylorCouette(Case):
         spacing, layers = self.particle_spacing, self.support_layers
         inner = cylinder_rings(self.inner_radius, spacing, layers)
         outer = cylinder_rings(self.outer_radius, spacing, layers, side=-1)
-        fluid = self._fluid(np.concatenate([inner.position, outer.position]))
+        solid = np.concatenate([inner.position, outer.position])
+        fluid = ring_of_fluid(self.inner_radius, self.outer_radius, self.resolution, solid)
         return join(
             particles(Kind.FLUID, fluid, 0.0),
             inner.particles(_around(inner.position)),
             outer.particles(self.outer_velocity * _around(outer.position), body=1),
         )
-
-    def _fluid(self, solid: FloatArray) -> FloatArray:
-        """Return as many particles (n, 2) as the ring between the cylinders has room for."""
-
-        def height(points: FloatArray) -> FloatArray:
-            radius = np.hypot(*points.T)
-            return np.asarray(np.minimum(self.outer_radius - radius, radius - self.inner_radius))
-
-        count = math.ceil(2 * self.outer_radius * self.resolution - 1e-6)
-        square, ring = (count * self.particle_spacing) ** 2, np.pi * (self.outer_radius**2 - self.inner_radius**2)
-        corner = np.full(2, count * self.particle_spacing / 2)
-        cells = lattice(*[symmetric_centres(count, self.particle_spacing)] * 2)
-        return pack(cells, Volume(height, -corner, corner, square - ring, 1.0), solid, self.particle_spacing)
 
     @property
     def steady(self) -> tuple[float, float]:

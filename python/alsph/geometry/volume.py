@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,7 +11,7 @@ import numpy as np
 
 from alsph.arrays import FloatArray
 from alsph.geometry.lattice import lattice, symmetric_centres
-from alsph.geometry.packing import spread
+from alsph.geometry.packing import pack, spread
 from alsph.geometry.particles import neighbour_tree
 from alsph.geometry.solids import Solid
 
@@ -166,3 +167,27 @@ def sphere(radius: float) -> Volume:
         return np.asarray(np.linalg.norm(points, axis=1) - radius)
 
     return Volume(distance, -corner, corner, 4 / 3 * np.pi * radius**3, np.pi * radius**2)
+
+
+def ring_of_fluid(inner: float, outer: float, resolution: int, solid: FloatArray) -> FloatArray:
+    """Return as many evenly spaced particles (n, 2) as the ring between two radii about 0 has room for.
+
+    Parameters
+    ----------
+    inner, outer
+        The radii [D].
+    resolution
+        Particles per reference length, D/Δx.
+    solid
+        Positions of the solid particles beyond both (m, 2).
+    """
+
+    def height(points: FloatArray) -> FloatArray:
+        radius = np.hypot(*points.T)
+        return np.asarray(np.minimum(outer - radius, radius - inner))
+
+    spacing, count = 1.0 / resolution, math.ceil(2 * outer * resolution - 1e-6)
+    square, ring = (count * spacing) ** 2, np.pi * (outer**2 - inner**2)
+    corner = np.full(2, count * spacing / 2)
+    cells = lattice(*[symmetric_centres(count, spacing)] * 2)
+    return pack(cells, Volume(height, -corner, corner, square - ring, 1.0), solid, spacing)
