@@ -2,6 +2,7 @@
 
 use crate::base::error::{Error, Result};
 use crate::settings::Body;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::base::Vector;
@@ -140,6 +141,12 @@ impl<const D: usize> Particles<D> {
         }
         counts
     }
+}
+
+/// What `of` says of each solid among particles of such kinds, in parallel, with its index.
+pub fn of_solids<T: Send>(kind: &[ParticleKind], of: impl Fn(usize) -> T + Sync) -> Vec<(usize, T)> {
+    let solids = (0..kind.len()).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
+    solids.map(|i| (i, of(i))).collect()
 }
 
 /// Bits of an id that an inlet particle shares with those that follow it; those above count them.

@@ -9,9 +9,8 @@ use crate::discretisation::{Correction, Largest, Surroundings};
 use crate::frame::Frame;
 use crate::halo::Poison;
 use crate::kernel::{Smoothing, with_kernel};
-use crate::particles::{ParticleKind, Particles};
+use crate::particles::{ParticleKind, Particles, of_solids};
 use crate::settings::Settings;
-use rayon::prelude::*;
 
 /// Of tr α over D: below it a particle is at the surface if nothing lies before it.
 const CANDIDATE: f64 = 0.875;
@@ -159,8 +158,7 @@ impl<const D: usize> Surface<D> {
             let fill = if full > 0.0 { sum / full } else { 0.0 };
             ((fill - DRY) / (WET - DRY)).clamp(0.0, 1.0)
         };
-        let solids = (0..particles.real).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
-        let shares: Vec<_> = solids.map(|s| (s, share(s))).collect();
+        let shares = of_solids(&kind[..particles.real], share);
         shares.into_iter().for_each(|(s, share)| frame.stencil.volume[s] *= share);
         frame.images.fill(&mut frame.stencil.volume);
     }
@@ -277,8 +275,7 @@ fn correct_solids<const D: usize>(settings: &Settings, particles: &Particles<D>,
         let mean: Option<[f64; 9]> = shepard(settings, &frame.stencil, s, |j, _| entries(j));
         mean.map_or_else(Matrix::identity, |mean| Matrix::from_column_slice(&mean[..D * D]))
     };
-    let solids = (0..particles.real).into_par_iter().filter(|&i| particles.kind[i] == ParticleKind::Solid);
-    let means: Vec<_> = solids.map(|s| (s, mean(s))).collect();
+    let means = of_solids(&particles.kind[..particles.real], mean);
     means.into_iter().for_each(|(s, mean)| frame.stencil.correction[s].inverse = mean);
 }
 

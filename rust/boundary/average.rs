@@ -7,9 +7,8 @@ use crate::frame::Frame;
 use crate::halo::{Mirrored, Poison};
 use crate::kernel::{Smoothing, with_kernel};
 use crate::neighbours::Entry;
-use crate::particles::{ParticleKind, Particles};
+use crate::particles::{ParticleKind, Particles, of_solids};
 use crate::settings::{Settings, WallPressure};
-use rayon::prelude::*;
 
 /// Σ W field_j / Σ W over the flowing neighbours of particle `i`, of the value that `at` gives for j and r_ij. None without
 /// neighbours.
@@ -45,8 +44,7 @@ fn extrapolate<T: Mirrored<D> + Poison, const D: usize, const N: usize>(
     frame.images.fill(field);
     let values = &*field;
     let average = |i| of(shepard(settings, &frame.stencil, i, |j, r_ij| at(values, i, j, r_ij)).unwrap_or([0.0; N]));
-    let solids = (0..kind.len()).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
-    let extrapolated: Vec<(usize, T)> = solids.map(|i| (i, average(i))).collect();
+    let extrapolated = of_solids(kind, average);
     if !extrapolated.is_empty() {
         let real = frame.images.real(field);
         extrapolated.into_iter().for_each(|(i, value)| real[i] = value);

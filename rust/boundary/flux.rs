@@ -9,9 +9,8 @@
 use crate::base::{Vector, parallel};
 use crate::boundary::average::for_each_weighted;
 use crate::frame::Frame;
-use crate::particles::{ParticleKind, Particles};
+use crate::particles::{ParticleKind, Particles, of_solids};
 use crate::settings::Settings;
-use rayon::prelude::*;
 
 /// A surface that turns by so much (the cosine) within so many spacings has a corner, as solids tell within this share of the support. No
 /// distances of lattices, at which rounding would decide.
@@ -31,7 +30,6 @@ pub fn add_wall_flux<const D: usize>(
     divergence: &mut [f64],
 ) {
     let stencil = &frame.stencil;
-    let is_solid = |i: &usize| particles.kind[*i] == ParticleKind::Solid;
     let share = |s: usize| {
         if !corners && is_at_corner(settings, particles, frame, s) {
             return 0.0;
@@ -53,7 +51,7 @@ pub fn add_wall_flux<const D: usize>(
         let flux = row.flowing().iter().map(|entry| flux(entry.j()) * entry.slope(lane)).sum::<f64>();
         stencil.volume[s] * flux / total
     };
-    let shares: Vec<_> = (0..particles.real).into_par_iter().filter(is_solid).map(|s| (s, share(s))).collect();
+    let shares = of_solids(&particles.kind[..particles.real], share);
     if shares.is_empty() {
         return;
     }

@@ -5,9 +5,8 @@ use crate::base::parallel;
 use crate::boundary::average::shepard;
 use crate::boundary::profile::profiles;
 use crate::frame::Frame;
-use crate::particles::{ParticleKind, Particles};
+use crate::particles::{ParticleKind, Particles, of_solids};
 use crate::settings::{Settings, WallVelocity};
-use rayon::prelude::*;
 
 /// Largest ratio of the distances of solid and fluid from the surface: β_max − 1 of Morris, Fox and Zhu (1997).
 const LARGEST_DISTANCE_RATIO: f64 = 0.5;
@@ -61,9 +60,8 @@ impl<const D: usize> Walls<D> {
     /// 2 u_wall minus the Shepard average of the fluid's velocity (Adami, Hu and Adams 2012, eq. 23).
     fn mirror(&mut self, settings: &Settings, particles: &Particles<D>, frame: &Frame<D>) {
         let Particles { real, kind, velocity, .. } = particles;
-        let solids = (0..*real).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
         let average = |i| shepard(settings, &frame.stencil, i, |j, _| velocity[j].into()).map(Vector::from);
-        let seen = solids.map(|i| (i, average(i).map_or(velocity[i], |average| velocity[i] * 2.0 - average))).collect();
+        let seen = of_solids(&kind[..*real], |i| average(i).map_or(velocity[i], |average| velocity[i] * 2.0 - average));
         self.show(particles, frame, seen);
     }
 

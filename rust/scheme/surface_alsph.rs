@@ -19,12 +19,11 @@ use crate::boundary::{VelocityRule, conditions, extrapolate_scalar, shepard};
 use crate::discretisation::{AdjointGradient, ConservativeGradient, Divergence, LaplacianAndGradient, LaplacianAndItsSum};
 use crate::flow::{Flow, Step};
 use crate::frame::Frame;
-use crate::particles::{ParticleKind, Particles};
+use crate::particles::{ParticleKind, Particles, of_solids};
 use crate::scheme::projection::{Sweeps, weight};
 use crate::scheme::{Derived, Scheme, Solved};
 use crate::settings::{Eigenvalues, FreeSurface, PressureGradient, Settings, TimeStepLimits};
 use crate::surface::{Place, Surface};
-use rayon::prelude::*;
 
 /// Height over a surface [Δx] from which on a particle comes no nearer, and its distance to a solid that tells of the surface.
 const CLOSE: f64 = 0.25;
@@ -179,10 +178,9 @@ impl<const D: usize> SurfaceAlsph<D> {
                 [pressure[j] + (body_force.at(j) - body_force.acceleration_of_wall(s)).dot(&r_sj) * known]
             });
             let [p] = mean.unwrap_or([0.0]);
-            (s, if self.own.tension { p } else { p.max(0.0) })
+            if self.own.tension { p } else { p.max(0.0) }
         };
-        let solids = (0..particles.real).into_par_iter().filter(|&i| particles.kind[i] == ParticleKind::Solid);
-        let shown: Vec<_> = solids.map(shown).collect();
+        let shown = of_solids(&particles.kind[..particles.real], shown);
         let real = frame.images.real(&mut particles.pressure);
         shown.into_iter().for_each(|(s, p)| real[s] = p);
         fill(particles);
@@ -357,10 +355,9 @@ fn mirror<const D: usize>(settings: &Settings, frame: &Frame<D>, particles: &Par
     let shown = |s: usize| {
         let own = particles.velocity[s];
         let mean = shepard(settings, &frame.stencil, s, |j, _| seen[j].into()).map_or(own, Vector::from);
-        (s, mean - normal[s] * (2.0 * (mean - own).dot(&normal[s])))
+        mean - normal[s] * (2.0 * (mean - own).dot(&normal[s]))
     };
-    let solids = (0..*real).into_par_iter().filter(|&i| kind[i] == ParticleKind::Solid);
-    let shown: Vec<_> = solids.map(shown).collect();
+    let shown = of_solids(&kind[..*real], shown);
     let real = frame.images.real(velocity);
     shown.into_iter().for_each(|(s, u)| real[s] = u);
     frame.images.fill(velocity);
