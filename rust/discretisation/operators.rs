@@ -142,7 +142,7 @@ impl<const D: usize> Operator<D> for Surroundings {
         near.for_each(
             #[inline(always)]
             |_, slope: V, r_ij| {
-                sum += slope;
+                sum += of_others(slope, r_ij);
                 reach = reach.plus_product(slope, norm_squared(r_ij).sqrt());
                 for k in 0..D {
                     let weight = slope * r_ij[k];
@@ -244,7 +244,7 @@ impl<const D: usize> Operator<D> for LaplacianDiagonal {
         near.for_each(
             #[inline(always)]
             |_, slope: V, r_ij| {
-                sum += slope;
+                sum += of_others(slope, r_ij);
                 add_product(&mut first, slope, r_ij);
             },
         );
@@ -294,6 +294,12 @@ impl<const D: usize, F: Fn(usize, usize) -> Vector<D> + Sync> Operator<D> for La
             ((laplacian[lane] + linear) * *factor, tensor[lane] * inverse)
         })
     }
+}
+
+/// The slope, but zero of the particle itself, which stands among its neighbours.
+#[inline(always)]
+fn of_others<V: Lanes, const D: usize>(slope: V, r_ij: [V; D]) -> V {
+    slope * (V::zero() - norm_squared(r_ij)).below(V::zero())
 }
 
 /// Σ slope (u_j − u_i) r_ijᵀ: ∇u before its correction.
