@@ -87,7 +87,8 @@ struct Found<const D: usize> {
     trace: f64,
     /// Smallest eigenvalue of α.
     least: f64,
-    /// See [`Surface::missing`].
+    /// Σ |slope|, and what that lacks of the lattice's.
+    slopes: f64,
     missing: f64,
     /// α⁻¹, with a floor under the eigenvalues of α.
     inverse: Matrix<D>,
@@ -99,6 +100,7 @@ impl<const D: usize> Poison for Found<D> {
     const POISON: Self = Self {
         trace: f64::NAN,
         least: f64::NAN,
+        slopes: f64::NAN,
         missing: f64::NAN,
         inverse: Tensor::<D>::POISON.0,
         first: <Vector<D> as Poison>::POISON,
@@ -121,9 +123,21 @@ impl<const D: usize> Surface<D> {
         self.strength[i][1] > 0.0
     }
 
-    /// Σ |slope| that the neighbours of particle `i` lack of the lattice's: the air has their place.
-    pub fn missing(&self, i: usize) -> f64 {
-        self.found[i].missing
+    /// λ², at most 1; zero of a particle that is alone.
+    pub fn wholeness(&self, i: usize) -> f64 {
+        if self.place[i] == Place::Isolated { 0.0 } else { self.found[i].least.powi(2).min(1.0) }
+    }
+
+    /// The Laplacian of particle `i` from that of its neighbours and its sum: next to the surface the air has the place of those that are
+    /// missing, over whose value its own is by `above`.
+    pub fn laplacian(&self, i: usize, (laplacian, sum): (f64, f64), above: f64) -> f64 {
+        if self.place[i].sees_air() { sum - 2.0 * self.found[i].missing * above } else { laplacian }
+    }
+
+    /// What the value of the particle itself counts in that, if `inside` is that without air.
+    pub fn laplacian_diagonal(&self, i: usize, inside: f64) -> f64 {
+        let Found { missing, slopes, .. } = self.found[i];
+        if self.place[i].sees_air() { -2.0 * (slopes + missing) } else { inside }
     }
 
     /// Find it in a frame, whose corrections it makes those of a cut support.
@@ -176,7 +190,8 @@ impl<const D: usize> Surface<D> {
             |i, (alpha, first, [slopes, lengths]), found, strength| {
                 let (values, vectors) = symmetric_eigen(&alpha);
                 let (least, inverse) = (values.min(), inverse_with_floor(&values, &vectors));
-                *found = Found { trace: alpha.trace() / D as f64, least, missing: (sum - slopes).max(0.0), inverse, first };
+                let missing = (sum - slopes).max(0.0);
+                *found = Found { trace: alpha.trace() / D as f64, least, slopes, missing, inverse, first };
                 // Solids have no equations, and are as dense as they were placed.
                 let is_fluid = particles.kind[i] == ParticleKind::Fluid;
                 *strength = [if is_fluid { lengths / least.max(FLOOR) / reach } else { 0.0 }, 0.0];

@@ -19,6 +19,8 @@ from alsph.results import outcome
 from alsph.study.results import names
 from alsph.watching.watched import Watched
 
+SCHEMES = ["alsph", "isph", "explicit_isph", "wcsph", "edac"]
+
 SURFACES = [model for model in cases.CASES.values() if issubclass(model, cases.FreeSurface)]
 
 
@@ -33,19 +35,28 @@ SURFACES = [model for model in cases.CASES.values() if issubclass(model, cases.F
         ("still_water", {"resolution": 20}),
     ],
 )
-@pytest.mark.parametrize("gradient", ["adjoint", "conservative"])
-def test_a_run_meets_its_references(tmp_path, name, parameters, gradient):
-    case = cases.CASES[name](**parameters, pressure_gradient=gradient)
+@pytest.mark.parametrize(
+    ("scheme", "gradient"), [(scheme, "adjoint") for scheme in SCHEMES] + [("alsph", "conservative")]
+)
+def test_a_run_meets_its_references(tmp_path, name, parameters, scheme, gradient):
+    if scheme != "alsph" and "dimensions" in parameters:
+        parameters = parameters | {"resolution": 10}
+    case = cases.CASES[name](**parameters, scheme=scheme, pressure_gradient=gradient)
     run = case.run(tmp_path / name, progress=False, output_interval=case.default_until / 10)
     assert len(run.measures) >= 3
-    missed = [measure for measure in run.measures if not measure.passed]
+    sound = {"pressure at the centre over exact"} if case.is_weakly_compressible else set()
+    missed = [measure for measure in run.measures if not measure.passed and measure.name not in sound]
     assert not missed, missed
+    # The pressure of sound that goes to and fro is one of an instant.
+    heard = [measure.value for measure in run.measures if measure.name in sound]
+    assert heard == pytest.approx(np.ones(len(heard)), abs=0.1)
 
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("gradient", ["adjoint", "conservative"])
-def test_a_dam_breaks_to_the_end_without_making_energy(seed, gradient):
-    case = cases.DamBreak(resolution=14, pressure_gradient=gradient)
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_dam_breaks_to_the_end_without_making_energy(seed, gradient, scheme):
+    case = cases.DamBreak(resolution=14, pressure_gradient=gradient, scheme=scheme)
     state = case.build().state
     state["position"] += np.random.default_rng(seed).uniform(-1e-3, 1e-3, state["position"].shape)
     simulation = case.restored(state, threads=1)
@@ -64,6 +75,8 @@ def test_a_dam_breaks_to_the_end_without_making_energy(seed, gradient):
     [
         *(model(resolution=12) for model in SURFACES),
         cases.DamBreak(resolution=8, dimensions=3),
+        *(cases.DamBreak(resolution=12, scheme=scheme) for scheme in SCHEMES[1:]),
+        *(cases.RollingTank(resolution=12, scheme=scheme) for scheme in SCHEMES[1:]),
         cases.FloatingBox(resolution=12, lift=0.1),
         cases.FloatingBox(resolution=12, pressure_gradient="adjoint", wall_velocity="morris", reynolds=100),
     ],
@@ -186,7 +199,8 @@ def test_the_front_of_the_reference_is_where_the_measures_have_it():
 @pytest.mark.parametrize(
     ("parameters", "told"),
     [
-        ({"scheme": "isph"}, "scheme"),
+        ({"scheme": "sisph"}, "scheme"),
+        ({"scheme": "isph", "density_relaxation": 0.5}, "density_relaxation"),
         ({"shifting": "strain"}, "shifting"),
         ({"algorithm": 1}, "algorithm"),
         ({"viscous_order": 4}, "viscous_order"),

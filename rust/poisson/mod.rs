@@ -1,7 +1,7 @@
 //! The pressure Poisson equation −∇²x = f of the particles, with the compact Laplacian (16), matrix-free.
 //!
 //! Outlets have x = 0. Solid particles show the mean of the fluid around, ∂x/∂n = 0; what flux a wall has belongs to the right-hand side
-//! ([`crate::boundary::add_wall_flux`]). In a domain without an outlet x is found up to a constant, and f less its mean is solved.
+//! ([`crate::boundary::add_wall_flux`]). Beside a free surface the neighbours that are missing are air, at x = 0. In a domain without outlet and air x is found up to a constant, and f less its mean is solved.
 //!
 //! All sums are exact, so that neither the number of threads nor the order of the particles changes a bit.
 
@@ -11,10 +11,11 @@ mod row;
 
 use crate::base::{exact_sums, parallel};
 use crate::boundary::{PressureRule, conditions, extrapolate_scalar};
-use crate::discretisation::{Laplacian, LaplacianDiagonal};
+use crate::discretisation::{Laplacian, LaplacianAndItsSum, LaplacianDiagonal};
 use crate::frame::Frame;
 use crate::particles::Particles;
 use crate::settings::{Eigenvalues, Settings, Solver};
+use crate::surface::{Place, Surface};
 use multigrid::Multigrid;
 
 pub use row::Row;
@@ -70,17 +71,21 @@ pub struct Poisson<const D: usize> {
 
 impl<const D: usize> Poisson<D> {
     /// Take the rows from the particles, and what `solver` needs of them.
-    pub fn begin(&mut self, settings: &Settings, particles: &Particles<D>, frame: &Frame<D>, solver: Solver) {
+    pub fn begin(&mut self, system: System<D>, solver: Solver) {
+        let System { settings, particles, frame, surface, .. } = system;
         let condition = conditions(settings);
+        let is_alone = |i: usize| surface.is_some_and(|surface| surface.place[i] == Place::Isolated);
         self.rows.resize(particles.real, Row::None);
         parallel::for_each(&mut self.rows, |i, row| {
             *row = match condition(particles.kind[i], &particles.position[i]).pressure {
+                _ if is_alone(i) => Row::Zero,
                 PressureRule::Solved | PressureRule::SolvedWithoutDivergence => Row::Solved,
                 PressureRule::Zero => Row::Zero,
                 PressureRule::FromFluid => Row::None,
             };
         });
-        self.closed = !self.rows.contains(&Row::Zero);
+        let sees_air = |surface: &Surface<D>| surface.place.iter().any(|place| place.sees_air());
+        self.closed = !self.rows.contains(&Row::Zero) && !surface.is_some_and(sees_air);
         let Self { residual, correction, second, step, product, second_product, direction, shadow, .. } = self;
         for field in [residual, step, product, second_product, direction, shadow] {
             frame.images.blank(field, particles.real);
@@ -91,11 +96,12 @@ impl<const D: usize> Poisson<D> {
                 let rows = &self.rows;
                 self.inverse_diagonal.resize(particles.real, 0.0);
                 frame.stencil.for_each_one(LaplacianDiagonal, &mut self.inverse_diagonal, |i, diagonal, inverse| {
+                    let diagonal = surface.map_or(diagonal, |surface| surface.laplacian_diagonal(i, diagonal));
                     *inverse = if rows[i] == Row::Solved { -1.0 / diagonal } else { 0.0 };
                 });
             }
             Solver::Multigrid | Solver::Bicgstab => {
-                self.multigrid.build(settings, particles, &frame.stencil.volume, &self.rows);
+                self.multigrid.build(settings, particles, &frame.stencil.volume, &self.rows, surface.is_some());
             }
         }
     }
@@ -156,7 +162,8 @@ impl<const D: usize> Poisson<D> {
     }
 
     /// −∇²x.
-    fn multiply(&self, System { settings, particles, frame, .. }: System<D>, x: &mut [f64], out: &mut [f64]) {
+    fn multiply(&self, system: System<D>, x: &mut [f64], out: &mut [f64]) {
+        let System { settings, particles, frame, surface, .. } = system;
         let rows = &self.rows;
         parallel::for_each(frame.images.real(x), |i, x| {
             if rows[i] == Row::Zero {
@@ -165,9 +172,13 @@ impl<const D: usize> Poisson<D> {
         });
         extrapolate_scalar(settings, frame, &particles.kind[..particles.real], x);
         let x = &*x;
-        frame.stencil.for_each_one(Laplacian(x), out, |i, laplacian, out| {
-            *out = if rows[i] == Row::Solved { -laplacian } else { 0.0 };
-        });
+        let row = |i: usize, laplacian: f64| if rows[i] == Row::Solved { -laplacian } else { 0.0 };
+        match surface {
+            None => frame.stencil.for_each_one(Laplacian(x), out, |i, value, out| *out = row(i, value)),
+            Some(surface) => frame.stencil.for_each_one(LaplacianAndItsSum(x), out, |i, value, out| {
+                *out = row(i, surface.laplacian(i, value, x[i]));
+            }),
+        }
         if self.closed {
             take_mean_off(rows, &frame.stencil.volume, out);
         }
@@ -206,7 +217,7 @@ impl<const D: usize> Poisson<D> {
 
     /// Set `out` to about the solution of −∇²x = `residual`: the background grid's, and Chebyshev's iteration for the short waves.
     fn precondition(&mut self, system: System<D>, residual: &[f64], out: &mut [f64]) {
-        let System { settings, particles, frame, largest } = system;
+        let System { settings, particles, frame, largest, .. } = system;
         let real = frame.images.real(out);
         self.multigrid.correct(&particles.position, &frame.stencil.volume, residual, self.closed, real);
         let largest = largest.laplacian / settings.particle_spacing.powi(2);
@@ -287,6 +298,8 @@ pub struct System<'a, const D: usize> {
     pub settings: &'a Settings,
     pub particles: &'a Particles<D>,
     pub frame: &'a Frame<D>,
+    /// The surface, where one is free.
+    pub surface: Option<&'a Surface<D>>,
     pub largest: Eigenvalues,
 }
 

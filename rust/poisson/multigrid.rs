@@ -17,6 +17,9 @@ const WIDTH: f64 = 2.0;
 /// A cell filled less than this is taken for empty.
 const EMPTY: f64 = 0.05;
 
+/// Share of a cell without particles from which on it is taken for air; less may be how particles happen to lie in it.
+const AIR: f64 = 0.4;
+
 /// How often a grid is smoothed before and after the coarser one's correction.
 const SWEEPS: usize = 3;
 
@@ -47,8 +50,8 @@ impl<const D: usize> Default for Multigrid<D> {
 }
 
 impl<const D: usize> Multigrid<D> {
-    /// Lay the grids for particles with these `rows`.
-    pub fn build(&mut self, settings: &Settings, particles: &Particles<D>, volume: &[f64], rows: &[Row]) {
+    /// Lay the grids for particles with these `rows`, amid air of zero pressure where there is a free surface.
+    pub fn build(&mut self, settings: &Settings, particles: &Particles<D>, volume: &[f64], rows: &[Row], air: bool) {
         let domain = &settings.domain;
         let buffer = |kind: Boundary| match kind {
             Boundary::Inlet | Boundary::Outlet => settings.buffer_length(),
@@ -66,7 +69,7 @@ impl<const D: usize> Multigrid<D> {
         let mut cell_of = std::mem::take(&mut self.cell_of);
         cell_of.resize(particles.real, 0);
         parallel::for_each(&mut cell_of, |i, cell| {
-            *cell = if rows[i] == Row::None { count } else { self.cell(&particles.position[i]) } as u32;
+            *cell = if rows[i] == Row::None && !air { count } else { self.cell(&particles.position[i]) } as u32;
         });
         self.cells.sort(&cell_of, count + 1, &particles.id);
         self.cell_of = cell_of;
@@ -75,11 +78,19 @@ impl<const D: usize> Multigrid<D> {
             let filled = self.cells.of(cell).filter(|&i| rows[i] == row).map(|i| volume[i]).sum::<f64>() / whole;
             if filled < EMPTY { 0.0 } else { filled }
         };
+        let solid = settings.undisturbed_volume() / whole;
         let mut content = vec![[0.0; 2]; count];
-        parallel::for_each(&mut content, |cell, content| *content = [Row::Solved, Row::Zero].map(|row| filled(row, cell)));
+        parallel::for_each(&mut content, |cell, content| {
+            *content = [Row::Solved, Row::Zero].map(|row| filled(row, cell));
+            if air {
+                let solids = self.cells.of(cell).filter(|&i| rows[i] == Row::None).count() as f64 * solid;
+                let empty = 1.0 - content[0] - solids;
+                content[1] = if empty > AIR { empty } else { 0.0 };
+            }
+        });
         self.lay(periodic, &content);
         let area = self.width.map(|width| whole / (width * width));
-        let beyond = self.width.map(|width| BEYOND * settings.particle_spacing / width);
+        let beyond = self.width.map(|width| if air { 0.0 } else { BEYOND * settings.particle_spacing / width });
         let mut filling = self.levels[0].fill(content, &area);
         self.levels[0].couple(&filling, &beyond);
         for k in 1..self.levels.len() {

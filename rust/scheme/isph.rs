@@ -32,15 +32,58 @@ const SEVERAL_DAMPING: f64 = 0.8;
 /// disorder of the particles, and with it the forces on bodies are three times as noisy. Where no pressure stands yet nothing was answered.
 const ANSWERED: f64 = 0.8;
 
+/// How the pressure comes from its equation.
+#[derive(Clone, Copy, Debug)]
+pub struct Solve {
+    pub solver: Solver,
+    pub goal: Goal,
+    /// J Δx²/a of an explicit pressure, whose waves have the square of the speed J Δx²/(a Δt²); NaN of a solved one.
+    relaxed: f64,
+}
+
+impl Solve {
+    pub fn new(own: ProjectionSettings) -> Self {
+        let ProjectionSettings { solver, tolerance, max_solver_iterations: max_iterations, .. } = own;
+        Self { solver, goal: Goal { tolerance, max_iterations, damping: JACOBI_DAMPING }, relaxed: f64::NAN }
+    }
+
+    /// By so many steps of Jacobi's iteration from the old pressure in place of a solve (Hosseini, Manzari and Hannani 2007; Rafiee and
+    /// Thiagarajan 2009; Barcarolo et al. 2012): as waves of the speed √(J/a) Δx/Δt, whose divergence a step takes off.
+    pub fn explicit(settings: &Settings, sweeps: usize) -> Self {
+        let damping = if sweeps == 1 { 1.0 } else { SEVERAL_DAMPING };
+        let relaxed = sweeps as f64 * settings.particle_spacing.powi(2) / settings.laplacian_diagonal();
+        Self { solver: Solver::Jacobi, goal: Goal { tolerance: 0.0, max_iterations: sweeps, damping }, relaxed }
+    }
+
+    fn is_explicit(&self) -> bool {
+        self.relaxed.is_finite()
+    }
+
+    /// How a solve ended, of an explicit pressure how many steps it took.
+    pub fn solved(&self, Solution { iterations, residual, within_tolerance }: Solution) -> Solved {
+        if self.is_explicit() {
+            return Solved::after(iterations);
+        }
+        Solved { iterations, residual, within_tolerance: (self.goal.tolerance > 0.0).then_some(within_tolerance) }
+    }
+
+    /// See [`Scheme::penalty`].
+    pub fn penalty(&self, time_step: f64) -> f64 {
+        self.relaxed / time_step
+    }
+
+    /// See [`Scheme::reach`].
+    pub fn reach(&self) -> f64 {
+        if self.is_explicit() { self.relaxed.sqrt() } else { f64::INFINITY }
+    }
+}
+
 /// The fields of one step beside those of the particles, real particles and, where they have neighbours that read them, images.
 #[derive(Debug)]
 pub struct Isph<const D: usize> {
     /// β.
     pressure_share: f64,
-    solver: Solver,
-    goal: Goal,
-    /// J Δx²/a of an explicit pressure, whose waves have the square of the speed J Δx²/(a Δt²); NaN of a solved one.
-    relaxed: f64,
+    solve: Solve,
     /// α.
     density_relaxation: f64,
     /// V of a particle of the undisturbed lattice.
@@ -68,33 +111,19 @@ pub struct Isph<const D: usize> {
 
 impl<const D: usize> Isph<D> {
     pub fn new(settings: &Settings, own: ProjectionSettings) -> Self {
-        Self::with(settings, own, JACOBI_DAMPING, f64::NAN)
+        Self::with(settings, Solve::new(own), own.pressure_share, own.density_relaxation)
     }
 
-    /// With so many steps of Jacobi's iteration from the old pressure in place of a solve (Hosseini, Manzari and Hannani 2007; Rafiee and
-    /// Thiagarajan 2009; Barcarolo et al. 2012): as waves of the speed √(J/a) Δx/Δt, whose divergence a step takes off.
+    /// See [`Solve::explicit`].
     pub fn explicit(settings: &Settings, sweeps: usize, density_relaxation: f64) -> Self {
-        let damping = if sweeps == 1 { 1.0 } else { SEVERAL_DAMPING };
-        let relaxed = sweeps as f64 * settings.particle_spacing.powi(2) / settings.laplacian_diagonal();
-        let solve = ProjectionSettings {
-            pressure_share: 0.0,
-            solver: Solver::Jacobi,
-            tolerance: 0.0,
-            max_solver_iterations: sweeps,
-            density_relaxation,
-        };
-        Self::with(settings, solve, damping, relaxed)
+        Self::with(settings, Solve::explicit(settings, sweeps), 0.0, density_relaxation)
     }
 
-    fn with(settings: &Settings, own: ProjectionSettings, damping: f64, relaxed: f64) -> Self {
-        let ProjectionSettings { pressure_share, solver, tolerance, max_solver_iterations, density_relaxation } = own;
-        let goal = Goal { tolerance, max_iterations: max_solver_iterations, damping };
+    fn with(settings: &Settings, solve: Solve, pressure_share: f64, density_relaxation: f64) -> Self {
         let largest = settings.largest_eigenvalues();
         Self {
             pressure_share,
-            solver,
-            goal,
-            relaxed,
+            solve,
             density_relaxation,
             undisturbed: settings.undisturbed_volume(),
             largest,
@@ -111,18 +140,6 @@ impl<const D: usize> Isph<D> {
             poisson: Poisson::default(),
             projection: Projection::default(),
         }
-    }
-
-    fn is_explicit(&self) -> bool {
-        self.relaxed.is_finite()
-    }
-
-    /// How a solve ended, of an explicit pressure how many steps it took.
-    fn solved(&self, Solution { iterations, residual, within_tolerance }: Solution) -> Solved {
-        if self.is_explicit() {
-            return Solved::after(iterations);
-        }
-        Solved { iterations, residual, within_tolerance: (self.goal.tolerance > 0.0).then_some(within_tolerance) }
     }
 
     /// The pressure that images and solids show.
@@ -176,7 +193,7 @@ impl<const D: usize> Isph<D> {
         let answered = if starts { 0.0 } else { ANSWERED };
         let flux_of = |j: usize| star[j] - particles.velocity[j] * answered;
         // A pressure that begins anew has but this step to answer in.
-        let corners = starts || self.pressure_share == 0.0 && !self.is_explicit();
+        let corners = starts || self.pressure_share == 0.0 && !self.solve.is_explicit();
         add_wall_flux(step.settings, particles, frame, flux_of, corners, &mut self.handed, &mut self.source);
         let (condition, factor) = (conditions(step.settings), step.settings.density / step.time_step);
         parallel::for_each(&mut self.source, |i, source| {
@@ -224,9 +241,10 @@ impl<const D: usize> Scheme<D> for Isph<D> {
         let share = self.pressure_share;
         frame.images.blank(&mut self.change, particles.len());
         parallel::for_each(frame.images.real(&mut self.change), |i, change| *change = (1.0 - share) * particles.pressure[i]);
-        self.poisson.begin(step.settings, particles, frame, self.solver);
-        let system = System { settings: step.settings, particles, frame, largest: self.largest };
-        let solution = self.poisson.solve(system, self.solver, self.goal, &mut self.source, &mut self.change);
+        let Solve { solver, goal, .. } = self.solve;
+        let system = System { settings: step.settings, particles, frame, surface: None, largest: self.largest };
+        self.poisson.begin(system, solver);
+        let solution = self.poisson.solve(system, solver, goal, &mut self.source, &mut self.change);
         self.correct_velocity(step, flow);
         let solenoidal = &self.solenoidal;
         if step.settings.projection_sweeps > 0 {
@@ -240,7 +258,7 @@ impl<const D: usize> Scheme<D> for Isph<D> {
             });
         }
         flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
-        self.solved(solution)
+        self.solve.solved(solution)
     }
 
     fn divergence(&self, i: usize) -> f64 {
@@ -256,10 +274,10 @@ impl<const D: usize> Scheme<D> for Isph<D> {
     }
 
     fn penalty(&self, time_step: f64) -> f64 {
-        self.relaxed / time_step
+        self.solve.penalty(time_step)
     }
 
     fn reach(&self, _: f64) -> f64 {
-        if self.is_explicit() { self.relaxed.sqrt() } else { f64::INFINITY }
+        self.solve.reach()
     }
 }

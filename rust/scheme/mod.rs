@@ -3,7 +3,7 @@
 mod alsph;
 mod isph;
 mod projection;
-mod surface_alsph;
+mod surface;
 mod viscous;
 mod weakly_compressible;
 
@@ -14,7 +14,6 @@ use crate::settings::{DensityDiffusion, SchemeSettings, Settings, TimeStepLimits
 
 pub use alsph::{Alsph, Derived};
 pub use isph::Isph;
-pub use surface_alsph::SurfaceAlsph;
 pub use weakly_compressible::WeaklyCompressible;
 
 /// A scheme. What a step does beside it, from the search of neighbours to loads and shift, is the same for all.
@@ -48,11 +47,11 @@ pub trait Scheme<const D: usize>: Send + Sync {
 
 /// The scheme that the settings name.
 pub fn build<const D: usize>(settings: &Settings) -> Box<dyn Scheme<D>> {
+    if let Some(own) = settings.free_surface {
+        return surface::build(settings, own);
+    }
     match settings.scheme {
-        SchemeSettings::Alsph => match settings.free_surface {
-            None => Box::new(Alsph::new(settings)),
-            Some(own) => Box::new(SurfaceAlsph::new(settings, own)),
-        },
+        SchemeSettings::Alsph => Box::new(Alsph::new(settings)),
         SchemeSettings::Isph(own) => Box::new(Isph::new(settings, own)),
         SchemeSettings::ExplicitIsph { sweeps, density_relaxation, .. } => {
             Box::new(Isph::explicit(settings, sweeps, density_relaxation))

@@ -194,9 +194,15 @@ impl Settings {
             return Ok(());
         };
         surface.validate()?;
+        let relaxation = match self.scheme {
+            SchemeSettings::Isph(own) => own.density_relaxation,
+            SchemeSettings::ExplicitIsph { density_relaxation, .. } => density_relaxation,
+            _ => 0.0,
+        };
+        use DerivativeFrame::{Initial, Midpoint};
         for (name, fits, needed) in [
-            ("scheme", self.scheme == SchemeSettings::Alsph, "alsph"),
-            ("derivative_frame", self.derivative_frame != DerivativeFrame::Updated, "midpoint or initial"),
+            ("scheme.density_relaxation", relaxation == 0.0, "0"),
+            ("derivative_frame", matches!(self.derivative_frame, Midpoint | Initial), "midpoint or initial"),
             ("shifting", self.shifting == Shifting::None, "none"),
             ("viscous_order", self.viscous_order == 2, "2"),
             ("velocity_laplacian", self.velocity_laplacian == VelocityLaplacian::Scalar, "scalar"),

@@ -3,6 +3,7 @@
 use super::set::Set;
 use alsph::poisson::{Goal, Poisson, Solution, System};
 use alsph::settings::{Settings, Solver};
+use alsph::surface::Surface;
 use alsph::{ParticleKind, Particles};
 use std::f64::consts::TAU;
 
@@ -21,10 +22,22 @@ pub fn solve<const D: usize>(
     source: &[f64],
     tolerance: f64,
 ) -> (Solution, Vec<f64>) {
+    solve_beside(None, set, settings, solver, source, tolerance)
+}
+
+/// The same beside a free surface.
+pub fn solve_beside<const D: usize>(
+    surface: Option<&Surface<D>>,
+    set: &Set<D>,
+    settings: &Settings,
+    solver: Solver,
+    source: &[f64],
+    tolerance: f64,
+) -> (Solution, Vec<f64>) {
     let Set { particles, frame } = set;
-    let system = System { settings, particles, frame, largest: settings.largest_eigenvalues() };
+    let system = System { settings, particles, frame, surface, largest: settings.largest_eigenvalues() };
     let mut poisson = Poisson::default();
-    poisson.begin(settings, particles, frame, solver);
+    poisson.begin(system, solver);
     let (mut source, mut x) = (source.to_vec(), vec![0.0; particles.len()]);
     let goal = Goal { tolerance, max_iterations: 1000, damping: 0.5 };
     let solution = poisson.solve(system, solver, goal, &mut source, &mut x);

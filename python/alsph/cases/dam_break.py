@@ -94,6 +94,7 @@ class DamBreak(FreeSurface):
 
     name: ClassVar[str] = "dam_break"
     title: ClassVar[str] = "dam break in a tank"
+    splashes: ClassVar[bool] = True
     later_names: ClassVar[tuple[str, ...]] = (
         *FreeSurface.later_names,
         "front at t = ",
@@ -108,9 +109,6 @@ class DamBreak(FreeSurface):
     tank_height: float = Field(default=3.0, gt=1, description="height above which spray is lost [H]")
     dimensions: Literal[2, 3] = Field(default=2, description="number of space dimensions")
     width: float = Field(default=0.5, gt=0, description="width of column and tank in 3-D [H]")
-    packing_relaxation: float = Field(
-        default=0.05, ge=0, le=1, description="share of a number density above the lattice's that a step takes off [-]"
-    )
 
     @model_validator(mode="after")
     def _the_tank_holds_the_column(self) -> Self:

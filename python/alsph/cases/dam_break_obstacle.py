@@ -61,6 +61,7 @@ class DamBreakObstacle(FreeSurface):
     title: ClassVar[str] = "dam break against a box"
     in_space: ClassVar[int] = 3
     velocity_max: ClassVar[float] = 2.5
+    splashes: ClassVar[bool] = True
     later_names: ClassVar[tuple[str, ...]] = (
         *FreeSurface.later_names,
         *(f"time of arrival at {name}, √(H/g)" for name in SENSORS),
@@ -69,9 +70,6 @@ class DamBreakObstacle(FreeSurface):
     )
 
     resolution: int = Field(default=20, ge=8, description="particles over the depth of the water, H/Δx [-]")
-    packing_relaxation: float = Field(
-        default=0.05, ge=0, le=1, description="share of a number density above the lattice's that a step takes off [-]"
-    )
 
     @property
     def default_until(self) -> float:

@@ -138,8 +138,8 @@ class FreeSurface(Case):
     """A fluid with a free surface, beyond which is air of no pressure.
 
     In cases with gravity D is H, the depth of the fluid, U = √(gH) and g = 1, hence times in √(H/g). A step is that of
-    ALSPH with operators that keep momentum and energy where a particle has no neighbours (docs/free_surface.md); the
-    other schemes, inlets and outlets are not there yet.
+    its scheme with operators that keep momentum and energy where a particle has no neighbours (docs/free_surface.md);
+    inlets and outlets are not there yet.
     """
 
     symbols: ClassVar[Symbols] = WATER
@@ -147,13 +147,31 @@ class FreeSurface(Case):
     picture_axis: ClassVar[str] = "y"
     idle: ClassVar[tuple[str, ...]] = ("tolerance", "viscous_theta")
     later_names: ClassVar[tuple[str, ...]] = (ENERGY,)
+    usual: ClassVar[Mapping[str, float]] = {"pressure_share": 1.0, "sound_speed": 20.0}
     gravity: ClassVar[bool] = True
     """Whether the body force (0, −1), in 3-D (0, 0, −1), acts."""
     tension: ClassVar[bool] = False
     """Whether the pressure may fall below that of the air, as in a fluid that turns."""
+    splashes: ClassVar[bool] = False
+    """Whether impacts press particles together, which `packing_relaxation` takes apart."""
 
     reynolds: float = Field(default=1e6, gt=0, description="Reynolds number UD/ν [-]")
-    scheme: Literal["alsph"] | None = Field(default=None, description="augmented Lagrangian SPH alone")
+    scheme: Literal["alsph", "isph", "explicit_isph", "wcsph", "edac"] | None = Field(
+        default=None,
+        description="augmented Lagrangian SPH, projection ISPH, explicit ISPH, weakly compressible SPH or entropically "
+        "damped artificial compressibility; alsph if not given",
+    )
+    sound_speed: float | None = Field(
+        default=None, gt=0, description="speed of sound of wcsph and edac, 20 if not given [U]"
+    )
+    pressure_share: float | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="how much of the old pressure isph's predicted velocity has felt, all if not given: less, and a "
+        "surface at rest creeps [-]",
+    )
+    density_relaxation: Literal[0] | None = Field(default=None, description="none: see packing_relaxation")
     courant: float | None = Field(
         default=None,
         gt=0,
@@ -183,8 +201,12 @@ class FreeSurface(Case):
         "pairs, which keeps angular momentum, too, and rest beside bodies; by default the one without bodies, the "
         "other with them",
     )
-    packing_relaxation: float = Field(
-        default=0.0, ge=0, le=1, description="share of a number density above the lattice's that a step takes off [-]"
+    packing_relaxation: float | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="share of a number density above the lattice's that a step takes off; if not given 0.05 where "
+        "water splashes, 0.015 of wcsph and edac, whose steps are short, else 0 [-]",
     )
 
     @classmethod
@@ -214,12 +236,13 @@ class FreeSurface(Case):
         sides = {side for pair in self.checked_domain.boundaries for side in pair}
         if other := sorted(sides.difference(SIDES)):
             raise ConfigError(f"{self.name}: a side is '{other[0]}'; with a free surface take {' or '.join(SIDES)}")
+        relaxation = (0.015 if self.is_weakly_compressible else 0.05) if self.splashes else 0.0
         return super().settings() | {
             "free_surface": {
                 "reference_velocity": self.reference_velocity,
                 "pressure_gradient": self.pressure_gradient or ("conservative" if self.checked_bodies else "adjoint"),
                 "tension": self.tension,
-                "packing_relaxation": self.packing_relaxation,
+                "packing_relaxation": relaxation if self.packing_relaxation is None else self.packing_relaxation,
             }
         }
 

@@ -46,6 +46,7 @@ class RollingTank(FreeSurface):
 
     name: ClassVar[str] = "rolling_tank"
     title: ClassVar[str] = "water in a tank that rolls"
+    splashes: ClassVar[bool] = True
     later_names: ClassVar[tuple[str, ...]] = (
         *(f"swing of the pressure at {name}, ρgH" for name in SENSORS),
         *(f"pressure at {name}" for name in SENSORS),
@@ -55,10 +56,6 @@ class RollingTank(FreeSurface):
     tank_height: float = Field(default=1.333, gt=1, description="height of the tank, whose top is open [H]")
     amplitude: float = Field(default=4.0, gt=0, le=30, description="amplitude of the roll [degrees]")
     frequency: float = Field(default=0.4354, gt=0, description="angular frequency of the roll [√(g/H)]")
-
-    packing_relaxation: float = Field(
-        default=0.05, ge=0, le=1, description="share of a number density above the lattice's that a step takes off [-]"
-    )
 
     @property
     def default_until(self) -> float:

@@ -1,11 +1,9 @@
-//! The ALSPH step of a fluid with a free surface.
+//! What the schemes have in common beside a free surface.
 //!
-//! Equations (8), (10) and (11) with operators that neither make energy nor lose momentum where the support of a particle is cut:
+//! Their terms neither make energy nor lose momentum where the support of a particle is cut:
 //!
 //! ```text
-//! u*    = u^n + Δt (r_AL G*(w q) + ν ∇²u),                        q = ∇·u^m − θ                  (8)
-//! p^{m+1} = p^m − r_AL w (ρ (∇·u* − θ) − Δt ∇²p^m)                                              (10)
-//! u^{m+1} = u* + Δt (g − P(p^{m+1})/ρ)                                                            (11)
+//! u^{n+1} = u* + Δt (g − P(p)/ρ),    sweeps  u ← u + σ G*(w q),  p ← p − ρσ/Δt w q,    q = ∇·u − θ
 //! ```
 //!
 //! G* is minus the adjoint of the divergence, w a weight that is 1 inside, P a gradient that is antisymmetric in pairs. In ∇²p next to
@@ -14,28 +12,80 @@
 //! Solids show what images beyond a slip wall do: to the divergence the mean velocity of the fluid around, the other way across the wall, and to
 //! gradients of w q its mean, of p its mean continued with the hydrostatic slope. The viscous term sees the wall's velocity by its rule.
 
+mod alsph;
+mod isph;
+mod weakly_compressible;
+
 use crate::base::{Tensor, Vector, parallel};
 use crate::boundary::{VelocityRule, conditions, extrapolate_scalar, shepard};
 use crate::discretisation::{AdjointGradient, ConservativeGradient, Divergence, LaplacianAndGradient, LaplacianAndItsSum};
 use crate::flow::{Flow, Step};
 use crate::frame::Frame;
 use crate::particles::{ParticleKind, Particles, of_solids};
+use crate::scheme::isph::Solve;
 use crate::scheme::projection::{Sweeps, weight};
 use crate::scheme::{Derived, Scheme, Solved};
-use crate::settings::{Eigenvalues, FreeSurface, PressureGradient, Settings, TimeStepLimits};
+use crate::settings::{
+    DensityDiffusion, Eigenvalues, FreeSurface, PressureGradient, SchemeSettings, Settings, TimeStepLimits,
+};
 use crate::surface::{Place, Surface};
+
+use alsph::Penalty;
+use isph::Solution;
+use weakly_compressible::Sound;
 
 /// Height over a surface [Δx] from which on a particle comes no nearer, and its distance to a solid that tells of the surface.
 const CLOSE: f64 = 0.25;
 const BESIDE: f64 = 1.2;
 
+/// The scheme that the settings name, beside a free surface.
+pub fn build<const D: usize>(settings: &Settings, own: FreeSurface) -> Box<dyn Scheme<D>> {
+    fn beside<const D: usize>(
+        settings: &Settings,
+        own: FreeSurface,
+        pressure: impl Pressure<D> + 'static,
+    ) -> Box<dyn Scheme<D>> {
+        Box::new(BesideSurface::new(settings, own, pressure))
+    }
+    match settings.scheme {
+        SchemeSettings::Alsph => beside(settings, own, Penalty::new(settings)),
+        SchemeSettings::Isph(isph) => beside(settings, own, Solution::new(settings, isph.pressure_share, Solve::new(isph))),
+        SchemeSettings::ExplicitIsph { sweeps, .. } => {
+            beside(settings, own, Solution::new(settings, 0.0, Solve::explicit(settings, sweeps)))
+        }
+        SchemeSettings::Wcsph { sound_speed, density_diffusion, diffusion_coefficient } => {
+            beside(settings, own, Sound::new(settings, sound_speed, density_diffusion, diffusion_coefficient))
+        }
+        SchemeSettings::Edac { sound_speed, diffusion_coefficient } => {
+            beside(settings, own, Sound::new(settings, sound_speed, DensityDiffusion::Molteni, diffusion_coefficient / 8.0))
+        }
+    }
+}
+
+/// How a scheme comes to the pressure.
+pub trait Pressure<const D: usize>: Send + Sync {
+    /// Advance pressure and velocity to n+1, but for what comes too near to solids.
+    fn advance(&mut self, terms: &mut Terms<D>, step: Step, flow: &mut Flow<D>) -> Solved;
+
+    /// See [`Scheme::penalty`].
+    fn penalty(&self, time_step: f64) -> f64;
+
+    /// See [`Scheme::reach`].
+    fn reach(&self, time_step: f64) -> f64;
+}
+
+/// A scheme beside a free surface.
 #[derive(Debug)]
-pub struct SurfaceAlsph<const D: usize> {
-    own: FreeSurface,
+pub struct BesideSurface<const D: usize, P> {
     largest: Eigenvalues,
-    sweeps: Sweeps,
-    /// r_AL of the step.
-    penalty: f64,
+    terms: Terms<D>,
+    pressure: P,
+}
+
+/// The terms of a step, and the fields that they need.
+#[derive(Debug)]
+pub struct Terms<const D: usize> {
+    own: FreeSurface,
     undisturbed: f64,
     derived: Vec<Derived<D>>,
     /// S of u^n, real particles.
@@ -49,18 +99,16 @@ pub struct SurfaceAlsph<const D: usize> {
     /// w q, and u as the divergence sees it, if there are solids.
     pushed: Vec<f64>,
     mirrored: Vec<Vector<D>>,
+    /// u*.
     velocity_star: Vec<Vector<D>>,
+    /// ∇²p with air beyond the surface.
     pressure_laplacian: Vec<f64>,
 }
 
-impl<const D: usize> SurfaceAlsph<D> {
-    pub fn new(settings: &Settings, own: FreeSurface) -> Self {
-        let largest = settings.largest_eigenvalues();
+impl<const D: usize> Terms<D> {
+    fn new(settings: &Settings, own: FreeSurface) -> Self {
         Self {
             own,
-            largest,
-            sweeps: Sweeps::new(settings, largest),
-            penalty: f64::NAN,
             undisturbed: settings.undisturbed_volume(),
             derived: Vec::new(),
             strain_rate: Vec::new(),
@@ -74,27 +122,44 @@ impl<const D: usize> SurfaceAlsph<D> {
         }
     }
 
-    /// What ∇·u^{n+1} is to be in the frame, and ∇²u^n.
+    /// What all of a step begins with: the terms of u^n, the solids' velocity at n+1, and the pressure that they show.
     fn begin(&mut self, step: Step, flow: &mut Flow<D>) {
+        self.derive(step, flow);
+        self.free_of_stress(step, flow);
+        flow.move_solids();
+        self.extend_pressure(step, flow);
+    }
+
+    /// The ∇·u that takes particles apart which are closer than the lattice's.
+    fn loosening<'a>(
+        &self,
+        step: Step,
+        frame: &'a Frame<D>,
+        surface: &'a Surface<D>,
+    ) -> impl Fn(usize) -> f64 + Sync + use<'a, D> {
+        let (relaxation, undisturbed) = (self.own.packing_relaxation / step.time_step, self.undisturbed);
+        move |i| match surface.place[i] {
+            Place::AtSurface | Place::Isolated => 0.0,
+            Place::Inside | Place::Near => relaxation * (undisturbed * frame.stencil.number_density[i] - 1.0).max(0.0),
+        }
+    }
+
+    /// What ∇·u^{n+1} is to be in the frame, and ∇²u^n.
+    fn derive(&mut self, step: Step, flow: &mut Flow<D>) {
         let Flow { particles, frame, surface, walls, .. } = flow;
         walls.see(step.settings, particles, frame);
         let walls = &*walls;
         frame.images.blank(&mut self.derived, particles.real);
         frame.images.blank(&mut self.divergence, particles.len());
         frame.images.blank(&mut self.strain_rate, particles.real);
-        let (place, density) = (&surface.place, &frame.stencil.number_density);
-        let (relaxation, undisturbed) = (self.own.packing_relaxation / step.time_step, self.undisturbed);
-        let velocity = &particles.velocity;
+        let (velocity, loosening) = (&particles.velocity, self.loosening(step, frame, surface));
         frame.stencil.for_each(
             LaplacianAndGradient { velocity, seen: |s, i| walls.seen_by(particles, s, i) },
             &mut self.derived,
             &mut self.strain_rate,
             |i, (laplacian, gradient), derived, strain_rate| {
-                let mut solenoidal = step.settings.derivative_frame.solenoidal_divergence(&gradient, step.time_step);
-                if !matches!(place[i], Place::AtSurface | Place::Isolated) {
-                    solenoidal += relaxation * (undisturbed * density[i] - 1.0).max(0.0);
-                }
-                *derived = Derived { laplacian, solenoidal };
+                let bent = step.settings.derivative_frame.solenoidal_divergence(&gradient, step.time_step);
+                *derived = Derived { laplacian, solenoidal: bent + loosening(i) };
                 strain_rate.0 = (gradient + gradient.transpose()) * 0.5;
             },
         );
@@ -157,8 +222,14 @@ impl<const D: usize> SurfaceAlsph<D> {
         frame.images.fill(&mut self.tensor);
     }
 
-    /// The pressure that images and solids show.
-    fn extend_pressure(&self, step: Step, Flow { particles, frame, body_force, surface, .. }: &mut Flow<D>) {
+    /// The pressure that images and solids show, which is not below that of the air where none is.
+    fn extend_pressure(&self, step: Step, flow: &mut Flow<D>) {
+        self.extend_pressure_above(self.least_pressure(), step, flow);
+    }
+
+    /// The same, of solids not below `least`.
+    fn extend_pressure_above(&self, least: f64, step: Step, flow: &mut Flow<D>) {
+        let Flow { particles, frame, body_force, surface, .. } = flow;
         let (place, settings) = (&surface.place, step.settings);
         let fill = |particles: &mut Particles<D>| {
             frame.images.fill_pressure(&mut particles.pressure, &particles.position, |i| match place[i] {
@@ -178,7 +249,7 @@ impl<const D: usize> SurfaceAlsph<D> {
                 [pressure[j] + (body_force.at(j) - body_force.acceleration_of_wall(s)).dot(&r_sj) * known]
             });
             let [p] = mean.unwrap_or([0.0]);
-            if self.own.tension { p } else { p.max(0.0) }
+            p.max(least)
         };
         let shown = of_solids(&particles.kind[..particles.real], shown);
         let real = frame.images.real(&mut particles.pressure);
@@ -186,61 +257,43 @@ impl<const D: usize> SurfaceAlsph<D> {
         fill(particles);
     }
 
-    fn predict_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
-        self.form_tensor(step.settings, flow);
+    /// u* of the viscous term alone. Solids keep their velocities.
+    fn predict_velocity(&mut self, step: Step, flow: &Flow<D>) {
         let Flow { particles, frame, before, .. } = flow;
         let condition = conditions(step.settings);
-        let (dt, viscosity, penalty) = (step.time_step, step.settings.kinematic_viscosity, self.penalty);
+        let factor = step.settings.kinematic_viscosity * step.time_step;
         frame.images.blank(&mut self.velocity_star, particles.len());
         let derived = &self.derived;
-        frame.stencil.for_each_one(
-            AdjointGradient { tensor: &self.tensor, own: |_| 1.0 },
-            frame.images.real(&mut self.velocity_star),
-            |i, gradient, star| {
-                *star = match condition(particles.kind[i], &particles.position[i]).velocity {
-                    VelocityRule::Kept => particles.velocity[i],
-                    VelocityRule::Solved => {
-                        before.velocity[i] + (gradient * penalty + derived[i].laplacian * viscosity) * dt
-                    }
-                };
-            },
-        );
-        frame.images.fill(&mut self.velocity_star);
-        mirror(step.settings, frame, particles, &mut self.velocity_star);
-    }
-
-    fn update_pressure(&mut self, step: Step, flow: &mut Flow<D>) {
-        let Flow { particles, frame, surface, .. } = &mut *flow;
-        frame.images.blank(&mut self.pressure_laplacian, particles.real);
-        let surface = &*surface;
-        let Surface { place, weight, .. } = surface;
-        let (pressure, air) = (&particles.pressure, &self.surface_pressure);
-        frame.stencil.for_each_one(
-            LaplacianAndItsSum(pressure),
-            &mut self.pressure_laplacian,
-            |i, (laplacian, sum), out| {
-                *out = if place[i].sees_air() { sum - 2.0 * surface.missing(i) * (pressure[i] - air[i]) } else { laplacian };
-            },
-        );
-        let Particles { kind, pressure, .. } = particles;
-        let (density, dt, penalty) = (step.settings.density, step.time_step, self.penalty);
-        let (laplacian, derived, tension) = (&self.pressure_laplacian, &self.derived, self.own.tension);
-        frame.stencil.for_each_one(Divergence(&self.velocity_star), frame.images.real(pressure), |i, divergence, p| {
-            if kind[i] == ParticleKind::Solid {
-                return;
-            }
-            if place[i] == Place::Isolated {
-                *p = 0.0;
-                return;
-            }
-            *p -= penalty * weight[i] * (density * (divergence - derived[i].solenoidal) - dt * laplacian[i]);
-            if !tension {
-                *p = p.max(0.0);
-            }
+        parallel::for_each(frame.images.real(&mut self.velocity_star), |i, star| {
+            *star = match condition(particles.kind[i], &particles.position[i]).velocity {
+                VelocityRule::Kept => particles.velocity[i],
+                VelocityRule::Solved => before.velocity[i] + derived[i].laplacian * factor,
+            };
         });
-        self.extend_pressure(step, flow);
+        self.show_predicted(step.settings, flow);
     }
 
+    /// u* of images and solids.
+    fn show_predicted(&mut self, settings: &Settings, Flow { particles, frame, .. }: &Flow<D>) {
+        frame.images.fill(&mut self.velocity_star);
+        mirror(settings, frame, particles, &mut self.velocity_star);
+    }
+
+    /// Find ∇²p, the pressure beyond the surface being that of the air.
+    fn find_pressure_laplacian(&mut self, Flow { particles, frame, surface, .. }: &Flow<D>) {
+        frame.images.blank(&mut self.pressure_laplacian, particles.real);
+        let (pressure, air) = (&particles.pressure, &self.surface_pressure);
+        frame.stencil.for_each_one(LaplacianAndItsSum(pressure), &mut self.pressure_laplacian, |i, value, out| {
+            *out = surface.laplacian(i, value, pressure[i] - air[i]);
+        });
+    }
+
+    /// The least pressure there is.
+    fn least_pressure(&self) -> f64 {
+        if self.own.tension { f64::NEG_INFINITY } else { 0.0 }
+    }
+
+    /// u^{n+1} by the pressure that there is, from u*.
     fn correct_velocity(&mut self, step: Step, flow: &mut Flow<D>) {
         let Flow { particles, frame, body_force, surface, .. } = flow;
         if self.own.pressure_gradient == PressureGradient::Adjoint {
@@ -277,6 +330,7 @@ impl<const D: usize> SurfaceAlsph<D> {
         frame.images.fill(velocity);
     }
 
+    /// Find ∇·u less θ.
     fn measure_divergence(&mut self, step: Step, Flow { particles, frame, .. }: &Flow<D>) {
         let derived = &self.derived;
         let mut velocity = &particles.velocity;
@@ -290,16 +344,17 @@ impl<const D: usize> SurfaceAlsph<D> {
         });
     }
 
-    fn sweep(&mut self, step: Step, flow: &mut Flow<D>) {
+    /// All projection sweeps of the step.
+    fn sweep(&mut self, step: Step, sweeps: Sweeps, flow: &mut Flow<D>) {
         for sweep in 0..step.settings.projection_sweeps {
-            let relaxation = self.sweeps.relaxation / weight(step.settings, sweep);
+            let relaxation = sweeps.relaxation / weight(step.settings, sweep);
             let factor = step.settings.density * relaxation / step.time_step;
             self.measure_divergence(step, flow);
             self.form_tensor(step.settings, flow);
             let Flow { particles, frame, surface, .. } = &mut *flow;
             let condition = conditions(step.settings);
             let Particles { kind, position, pressure, velocity, .. } = particles;
-            let (divergence, weight, tension) = (&self.divergence, &surface.weight, self.own.tension);
+            let (divergence, weight, least) = (&self.divergence, &surface.weight, self.least_pressure());
             let (real_pressure, real_velocity) = (frame.images.real(pressure), frame.images.real(velocity));
             frame.stencil.for_each(
                 AdjointGradient { tensor: &self.tensor, own: |_| 1.0 },
@@ -308,16 +363,56 @@ impl<const D: usize> SurfaceAlsph<D> {
                 |i, gradient, u, p| {
                     if condition(kind[i], &position[i]).velocity == VelocityRule::Solved {
                         *u += gradient * relaxation;
-                        *p -= factor * weight[i] * divergence[i];
-                        if !tension {
-                            *p = p.max(0.0);
-                        }
+                        *p = (*p - factor * weight[i] * divergence[i]).max(least);
                     }
                 },
             );
             frame.images.fill(velocity);
         }
         self.extend_pressure(step, flow);
+    }
+}
+
+impl<const D: usize, P: Pressure<D>> BesideSurface<D, P> {
+    pub fn new(settings: &Settings, own: FreeSurface, pressure: P) -> Self {
+        Self { largest: settings.largest_eigenvalues(), terms: Terms::new(settings, own), pressure }
+    }
+}
+
+impl<const D: usize, P: Pressure<D>> Scheme<D> for BesideSurface<D, P> {
+    fn limits(&self, settings: &Settings, velocity_max: f64) -> TimeStepLimits {
+        settings.time_step_limits(velocity_max, self.largest)
+    }
+
+    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> Solved {
+        self.terms.begin(step, flow);
+        let solved = self.pressure.advance(&mut self.terms, step, flow);
+        keep_out(step.settings, flow);
+        self.terms.measure_divergence(step, flow);
+        if !step.settings.bodies.is_empty() {
+            flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
+        }
+        solved
+    }
+
+    fn divergence(&self, i: usize) -> f64 {
+        self.terms.divergence[i]
+    }
+
+    fn acting_pressure(&self, _: Step, particles: &Particles<D>, i: usize) -> f64 {
+        particles.pressure[i]
+    }
+
+    fn viscous_laplacian(&self, _: Step, i: usize) -> Vector<D> {
+        self.terms.derived[i].laplacian
+    }
+
+    fn penalty(&self, time_step: f64) -> f64 {
+        self.pressure.penalty(time_step)
+    }
+
+    fn reach(&self, time_step: f64) -> f64 {
+        self.pressure.reach(time_step)
     }
 }
 
@@ -361,53 +456,4 @@ fn mirror<const D: usize>(settings: &Settings, frame: &Frame<D>, particles: &Par
     let real = frame.images.real(velocity);
     shown.into_iter().for_each(|(s, u)| real[s] = u);
     frame.images.fill(velocity);
-}
-
-impl<const D: usize> Scheme<D> for SurfaceAlsph<D> {
-    fn limits(&self, settings: &Settings, velocity_max: f64) -> TimeStepLimits {
-        settings.time_step_limits(velocity_max, self.largest)
-    }
-
-    fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> Solved {
-        self.penalty = step.settings.penalty(step.velocity_max, step.time_step, self.largest.laplacian);
-        self.begin(step, flow);
-        self.free_of_stress(step, flow);
-        flow.move_solids();
-        self.extend_pressure(step, flow);
-        for iteration in 1..=step.settings.max_iterations {
-            if iteration > 1 {
-                self.measure_divergence(step, flow);
-            }
-            self.predict_velocity(step, flow); // (8)
-            self.update_pressure(step, flow); // (10)
-            self.correct_velocity(step, flow); // (11)
-        }
-        self.sweep(step, flow);
-        keep_out(step.settings, flow);
-        self.measure_divergence(step, flow);
-        if !step.settings.bodies.is_empty() {
-            flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
-        }
-        Solved::after(step.settings.max_iterations)
-    }
-
-    fn divergence(&self, i: usize) -> f64 {
-        self.divergence[i]
-    }
-
-    fn acting_pressure(&self, _: Step, particles: &Particles<D>, i: usize) -> f64 {
-        particles.pressure[i]
-    }
-
-    fn viscous_laplacian(&self, _: Step, i: usize) -> Vector<D> {
-        self.derived[i].laplacian
-    }
-
-    fn penalty(&self, _: f64) -> f64 {
-        self.penalty
-    }
-
-    fn reach(&self, time_step: f64) -> f64 {
-        (self.penalty * time_step + self.sweeps.reach_squared()).sqrt()
-    }
 }
