@@ -467,7 +467,9 @@ fn the_air_is_where_neighbours_are_missing() {
         let mut unit = vec![0.0; particles.len()];
         unit[i] = 1.0;
         assert_relative_eq!(laplacian(&unit)[i], diagonal[i], max_relative = 1e-6);
-        assert_relative_eq!(diagonal[i], -settings.laplacian_diagonal() / SPACING.powi(2), max_relative = 0.01);
+        if particles.position[i][1] < 1.7 {
+            assert_relative_eq!(diagonal[i], -settings.laplacian_diagonal() / SPACING.powi(2), max_relative = 0.01);
+        }
     }
     let inside = |i: usize| particles.position[i][0] > 1.0 && particles.position[i][0] < 3.0;
     let heights: Vec<_> = (0..particles.real).filter(|&i| inside(i)).map(|i| (i, particles.position[i][1])).collect();
@@ -499,7 +501,7 @@ fn the_pressure_under_a_surface_is_solved_in_few_iterations() {
                 let (solution, x) = solve_beside(Some(&surface), &set, &settings, solver, &source, tolerance);
                 let most = match solver {
                     Solver::Bicgstab => 8,
-                    Solver::Multigrid => 30,
+                    Solver::Multigrid => 20,
                     Solver::Jacobi => 1000,
                 };
                 assert!(solution.iterations <= most, "{rows} {disorder} {solver:?}: {solution:?}");
@@ -507,9 +509,12 @@ fn the_pressure_under_a_surface_is_solved_in_few_iterations() {
             });
             for i in 0..set.particles.real {
                 let height = set.particles.position[i][1];
-                // What is missing stands a row above the surface, and there the pressure is zero.
                 let exact = 0.5 * (1.0 - height * height);
-                assert!((found[0][i] - exact).abs() < 1.2 * spacing, "{rows} {disorder} at {height}: {} for {exact}", found[0][i]);
+                assert!(
+                    (found[0][i] - exact).abs() < if disorder == 0.0 { 0.15 } else { 0.75 } * spacing,
+                    "{rows} {disorder} at {height}: {} for {exact}",
+                    found[0][i]
+                );
                 assert!((found[0][i] - found[1][i]).abs() < 1e-6, "{rows} {disorder} at {height}");
                 assert!(
                     rows > 16 || (found[0][i] - found[2][i]).abs() < 0.1,

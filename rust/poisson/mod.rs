@@ -25,6 +25,9 @@ pub use row::Row;
 const CHEBYSHEV_STEPS: usize = 3;
 const CHEBYSHEV_INTERVAL: [f64; 2] = [1.0 / 6.0, 1.15];
 
+/// How much larger λ_max is beside a surface, where the air counts more than neighbours do.
+const AIR_MARGIN: f64 = 1.25;
+
 /// A solve ends when the residual has not fallen by so much in so many iterations: what is left may have no solution.
 const FALL: f64 = 0.99;
 const PATIENCE: usize = 20;
@@ -217,10 +220,11 @@ impl<const D: usize> Poisson<D> {
 
     /// Set `out` to about the solution of −∇²x = `residual`: the background grid's, and Chebyshev's iteration for the short waves.
     fn precondition(&mut self, system: System<D>, residual: &[f64], out: &mut [f64]) {
-        let System { settings, particles, frame, largest, .. } = system;
+        let System { settings, particles, frame, surface, largest } = system;
         let real = frame.images.real(out);
         self.multigrid.correct(&particles.position, &frame.stencil.volume, residual, self.closed, real);
-        let largest = largest.laplacian / settings.particle_spacing.powi(2);
+        let margin = if surface.is_some() { AIR_MARGIN } else { 1.0 };
+        let largest = margin * largest.laplacian / settings.particle_spacing.powi(2);
         let [low, high] = CHEBYSHEV_INTERVAL.map(|share| share * largest);
         let (center, half) = (0.5 * (high + low), 0.5 * (high - low));
         let mut product = std::mem::take(&mut self.product);

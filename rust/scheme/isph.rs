@@ -21,12 +21,11 @@ use crate::poisson::{Goal, Poisson, Solution, System};
 use crate::scheme::projection::{Projection, Sweeps};
 use crate::scheme::viscous::Viscous;
 use crate::scheme::{Scheme, Solved};
-use crate::settings::{Eigenvalues, ProjectionSettings, Settings, Solver, TimeStepLimits};
+use crate::settings::{Eigenvalues, ProjectionSettings, Settings, Solver, TimeStepLimits, jacobi_damping};
 use crate::shifting::measures_divergence;
 
-/// Damping of Jacobi's iteration (Muta, Ramachandran and Negi 2020), and of several of its steps in place of a solve.
+/// Damping of Jacobi's iteration (Muta, Ramachandran and Negi 2020).
 const JACOBI_DAMPING: f64 = 0.5;
-const SEVERAL_DAMPING: f64 = 0.8;
 
 /// The share of u^n's flux into walls, the answer of the step before, that is not answered again. What that answer left is mostly the
 /// disorder of the particles, and with it the forces on bodies are three times as noisy. Where no pressure stands yet nothing was answered.
@@ -37,7 +36,7 @@ const ANSWERED: f64 = 0.8;
 pub struct Solve {
     pub solver: Solver,
     pub goal: Goal,
-    /// J Δx²/a of an explicit pressure, whose waves have the square of the speed J Δx²/(a Δt²); NaN of a solved one.
+    /// (c Δt)² of an explicit pressure, whose waves have the speed c; NaN of a solved one.
     relaxed: f64,
 }
 
@@ -48,10 +47,9 @@ impl Solve {
     }
 
     /// By so many steps of Jacobi's iteration from the old pressure in place of a solve (Hosseini, Manzari and Hannani 2007; Rafiee and
-    /// Thiagarajan 2009; Barcarolo et al. 2012): as waves of the speed √(J/a) Δx/Δt, whose divergence a step takes off.
+    /// Thiagarajan 2009; Barcarolo et al. 2012): as waves, whose divergence a step takes off.
     pub fn explicit(settings: &Settings, sweeps: usize) -> Self {
-        let damping = if sweeps == 1 { 1.0 } else { SEVERAL_DAMPING };
-        let relaxed = sweeps as f64 * settings.particle_spacing.powi(2) / settings.laplacian_diagonal();
+        let (damping, relaxed) = (jacobi_damping(sweeps), settings.explicit_reach(sweeps).powi(2));
         Self { solver: Solver::Jacobi, goal: Goal { tolerance: 0.0, max_iterations: sweeps, damping }, relaxed }
     }
 

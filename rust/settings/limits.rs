@@ -5,6 +5,11 @@ use super::{Eigenvalues, SchemeSettings, Settings, WallVelocity};
 /// c₀Δt over what a lattice's shortest waves bear.
 const ACOUSTIC_SHARE: f64 = 0.45;
 
+/// Damping of as many steps of Jacobi's iteration as explicit ISPH takes: particles that an impact presses together bear no whole one.
+pub fn jacobi_damping(sweeps: usize) -> f64 {
+    if sweeps == 1 { 0.84 } else { 0.67 }
+}
+
 /// Upper bounds of Δt; infinite where one does not apply.
 #[derive(Clone, Copy, Debug)]
 pub struct TimeStepLimits {
@@ -13,7 +18,7 @@ pub struct TimeStepLimits {
     /// r_AL Δt λ_max < 2 for a given C_BV (method section 3).
     pub penalty: f64,
     /// A weakly compressible scheme's: (c₀ + u_max) Δt below a share of what a lattice's shortest waves bear, 2 Δx/√λ. That of explicit ISPH,
-    /// whose waves have the speed √(J/a) Δx/Δt with J sweeps, a being the Laplacian's diagonal times Δx²: u_max below its share of that.
+    /// whose waves go so far in a step, whatever its length ([`Settings::explicit_reach`]): u_max below its share of their speed.
     pub acoustic: f64,
     /// 0.125 h²/ν.
     pub viscous: f64,
@@ -51,12 +56,19 @@ impl Settings {
         }
     }
 
+    /// How far waves go in a step of explicit ISPH: √(Jω/a) Δx with J steps of Jacobi's iteration, ω their damping and a the Laplacian's
+    /// diagonal times Δx².
+    pub fn explicit_reach(&self, sweeps: usize) -> f64 {
+        let relaxed = sweeps as f64 * jacobi_damping(sweeps) / self.laplacian_diagonal();
+        relaxed.sqrt() * self.particle_spacing
+    }
+
     fn acoustic_limit(&self, velocity_max: f64, largest: Eigenvalues) -> f64 {
         let spacing = self.particle_spacing;
         match self.scheme {
             SchemeSettings::Alsph | SchemeSettings::Isph(_) => f64::INFINITY,
             SchemeSettings::ExplicitIsph { sweeps, mach_number, .. } => {
-                mach_number * (sweeps as f64 / self.laplacian_diagonal()).sqrt() * spacing / velocity_max
+                mach_number * self.explicit_reach(sweeps) / velocity_max
             }
             SchemeSettings::Wcsph { sound_speed, .. } | SchemeSettings::Edac { sound_speed, .. } => {
                 ACOUSTIC_SHARE * 2.0 * spacing / (largest.projection.sqrt() * (sound_speed + velocity_max))

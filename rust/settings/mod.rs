@@ -12,7 +12,7 @@ mod rules;
 
 pub use domain::{Body, Boundary, Domain, Rigid};
 pub use lattice::Eigenvalues;
-pub use limits::TimeStepLimits;
+pub use limits::{TimeStepLimits, jacobi_damping};
 pub use rules::{
     DensityDiffusion, DerivativeFrame, FreeSurface, PressureGradient, ProjectionSettings, SchemeSettings, Shifting, Solver,
     SweepPressure, SweepWeights, VelocityLaplacian, WallPressure, WallVelocity,
