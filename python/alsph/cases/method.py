@@ -341,6 +341,11 @@ class Method(Parameters):
         """Return a case with some parameters changed; see `superseded`."""
         return super().replace(**dict.fromkeys(superseded(changes, dict(self))) | changes)
 
+    @classmethod
+    def schemes(cls) -> tuple[str, ...]:
+        """Return the schemes that the case takes."""
+        return tuple(name for choice in get_args(cls.model_fields["scheme"].annotation) for name in get_args(choice))
+
     @property
     def is_weakly_compressible(self) -> bool:
         """Whether the fluid has a speed of sound, whatever the step."""

@@ -15,6 +15,7 @@ from alsph import plotting, study
 from alsph.analysis.averages import Estimate
 from alsph.analysis.measures import Measure
 from alsph.analysis.noise import load_noise, pressure_noise
+from alsph.cases import find
 from alsph.cases.base import Case
 from alsph.cases.method import OWNERS, SCHEMES, of_all_schemes, of_scheme, superseded
 from alsph.cases.remarks import keywords
@@ -28,6 +29,7 @@ from alsph.study.comparison import CPU, STEPS, Comparison, costs_of
 from alsph.study.declaration import Study, Sweep
 from alsph.study.results import Results
 from alsph.study.state import RUNS, State
+from alsph.symbols import Symbols
 from alsph.tables import markdown
 from alsph.text import printable, sha256
 
@@ -139,6 +141,10 @@ class SchemeComparison:
                 said.setdefault(keywords([remark]), []).append(row.label)
         return found + [f"{remark}: {'; '.join(dict.fromkeys(labels))}" for remark, labels in said.items()]
 
+    @property
+    def _symbols(self) -> Symbols:
+        return self.results.symbols
+
     def _times(self) -> list[str]:
         """Return how the times of the runs were taken, in words."""
         facts = [row.run.info for row in self.rows if row.run]
@@ -157,7 +163,7 @@ class SchemeComparison:
         parts = [
             self._table_of_measures(),
             self._table_of_numbers(),
-            "\n".join(f"- {note}" for note in self.notes),
+            "\n".join(f"- {self._symbols(note)}" for note in self.notes),
             *(f"![{name}]({name}.png)" for name in figures),
         ]
         return printable("\n\n".join(parts) + "\n", lines=True)
@@ -170,7 +176,7 @@ class SchemeComparison:
         ]
         known = [_references([row.measures[name] for row in self.rows if name in row.measures]) for name in names]
         rows += [["reference", "", "", *known]] * any(known)
-        return markdown(["scheme", "D/Δx", "status", *names], rows)
+        return markdown(["scheme", self._symbols("D/Δx"), "status", *names], rows)
 
     def _table_of_numbers(self) -> str:
         names = [*dict.fromkeys(name for row in self.rows for name in row.numbers)]
@@ -178,7 +184,7 @@ class SchemeComparison:
             [row.scheme, str(row.resolution), *(_number(row.numbers.get(name)) for name in names), str(row.folder)]
             for row in self.rows
         ]
-        return markdown(["scheme", "D/Δx", *names, "run"], rows)
+        return markdown(["scheme", *map(self._symbols, ["D/Δx", *names]), "run"], rows)
 
     def __str__(self) -> str:
         """Return the tables."""
@@ -202,6 +208,8 @@ class SchemeComparison:
         }
         pictures = {"cost": plotting.panels(curves, "CPU seconds a $D/U$", ("x", "y"))} if curves else {}
         runs = {row.scheme: row.run for row in self.rows if row.run and row.resolution == self._finest}
+        for picture in pictures.values():
+            plotting.rename(picture, self._symbols)
         return pictures | (Comparison(runs).draw() if runs else {})
 
     @property
@@ -221,7 +229,7 @@ class SchemeComparison:
 
 def compare_schemes(
     case: Case | Config | Mapping[str, Any],
-    schemes: Sequence[str] = SCHEMES,
+    schemes: Sequence[str] | None = None,
     resolutions: Sequence[int] = (),
     output: str | Path = "runs/studies",
     *,
@@ -240,7 +248,8 @@ def compare_schemes(
     case
         The case, with or without settings of its runs, or the tables of its file. Its scheme does not count.
     schemes
-        Two or more of ``alsph``, ``isph``, ``explicit_isph``, ``wcsph``, ``edac``, ``shadloo`` and ``sisph``.
+        Two or more of ``alsph``, ``isph``, ``explicit_isph``, ``wcsph``, ``edac``, ``shadloo`` and ``sisph``; all that
+        the case takes if not given.
     resolutions
         D/Δx; that of the case if none are given. Two or more draw errors as curves over the cost.
     output
@@ -276,9 +285,11 @@ def _tables(case: Case | Config | Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _declared(
-    tables: dict[str, Any], schemes: Sequence[str], resolutions: Sequence[int], parameters: dict[str, Any]
+    tables: dict[str, Any], schemes: Sequence[str] | None, resolutions: Sequence[int], parameters: dict[str, Any]
 ) -> Study:
     """Return the study of the schemes, named by its runs."""
+    if schemes is None:
+        schemes = find(tables["case"]).schemes()
     chosen = [*dict.fromkeys([schemes] if isinstance(schemes, str) else schemes)]
     for scheme in chosen:
         choose("schemes", scheme, SCHEMES)
