@@ -127,11 +127,6 @@ impl<const D: usize> Surface<D> {
         self.strength[i][1] > 0.0
     }
 
-    /// λ², at most 1; zero of a particle that is alone.
-    pub fn wholeness(&self, i: usize) -> f64 {
-        if self.place[i] == Place::Isolated { 0.0 } else { self.found[i].least.powi(2).min(1.0) }
-    }
-
     /// The Laplacian of particle `i` from that of its neighbours and its sum: next to the surface the air has the place of those that are
     /// missing, over whose value at the surface its own is by `above`.
     pub fn laplacian(&self, i: usize, (laplacian, sum): (f64, f64), above: f64) -> f64 {

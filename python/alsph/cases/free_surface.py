@@ -147,7 +147,7 @@ class FreeSurface(Case):
     picture_axis: ClassVar[str] = "y"
     idle: ClassVar[tuple[str, ...]] = ("tolerance", "viscous_theta")
     later_names: ClassVar[tuple[str, ...]] = (ENERGY,)
-    usual: ClassVar[Mapping[str, float]] = {"pressure_share": 1.0, "sound_speed": 20.0}
+    usual_sound_speed: ClassVar[float] = 20.0
     gravity: ClassVar[bool] = True
     """Whether the body force (0, −1), in 3-D (0, 0, −1), acts."""
     tension: ClassVar[bool] = False
@@ -163,13 +163,6 @@ class FreeSurface(Case):
     )
     sound_speed: float | None = Field(
         default=None, gt=0, description="speed of sound of wcsph and edac, 20 if not given [U]"
-    )
-    pressure_share: float | None = Field(
-        default=None,
-        ge=0,
-        le=1,
-        description="how much of the old pressure isph's predicted velocity has felt, all if not given: less, and a "
-        "surface at rest creeps [-]",
     )
     density_relaxation: Literal[0] | None = Field(default=None, description="none: see packing_relaxation")
     courant: float | None = Field(

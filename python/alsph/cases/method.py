@@ -137,8 +137,8 @@ class Method(Parameters):
 
     in_space: ClassVar[int] = 2
     """Number of space dimensions of a case without a parameter for it."""
-    usual: ClassVar[Mapping[str, float]] = {"pressure_share": 0.9, "sound_speed": 10.0}
-    """What parameters of schemes are where none is given: of the speed of sound [U] the density varies by 1 %."""
+    usual_sound_speed: ClassVar[float] = 10.0
+    """Speed of sound of the weakly compressible schemes where none is given [U]: the density varies by 1 %."""
 
     scheme: Scheme | None = Field(
         default=None,
@@ -362,7 +362,7 @@ class Method(Parameters):
         if self.is_projection:
             return {
                 "kind": "isph",
-                "pressure_share": self.usual["pressure_share"] if self.pressure_share is None else self.pressure_share,
+                "pressure_share": 0.9 if self.pressure_share is None else self.pressure_share,
                 "solver": self.solver or "bicgstab",
                 "tolerance": self.residual_tolerance,
                 "max_solver_iterations": self.most_iterations,
@@ -376,7 +376,7 @@ class Method(Parameters):
         given = self.diffusion_coefficient
         settings: dict[str, Any] = {
             "kind": self.scheme,
-            "sound_speed": self.sound_speed or self.usual["sound_speed"],
+            "sound_speed": self.sound_speed or self.usual_sound_speed,
             "diffusion_coefficient": DIFFUSION[self.scheme or ""] if given is None else given,
         }
         if self.scheme == "wcsph":

@@ -1,10 +1,11 @@
 //! ISPH beside a free surface, with a solve or a few steps of Jacobi's iteration.
 //!
 //! ```text
-//! u* = u^n + Δt ν ∇²u,    ∇²q = ρ/Δt (∇·(u* + β Δt (g − P(p^n)/ρ)) − θ),    p = β p^n + q,    u^{n+1} = u* + Δt (g − P(p)/ρ)
+//! u* = u^n + Δt ν ∇²u,    ∇²q = ρ/Δt w (∇·(u* + β Δt (g − P(p^n)/ρ)) − θ),    p = β p^n + q,    u^{n+1} = u* + Δt (g − P(p)/ρ)
 //! ```
 //!
-//! Of β = 1 water at rest is one with ∇·u = 0 for the operators of the velocity; with β = 0 it would be with that of ∇², and its surface would creep.
+//! with w the weight of a cut support. What the velocity has felt of the old pressure leaves the change to the
+//! operator ∇²: with β = 0 water at rest would be what that takes for it, not what P does, and its surface would creep.
 //! Beyond walls the pressure goes on with the hydrostatic slope, beyond the surface is air: what both add to ∇² without any p belongs to the
 //! right-hand side. Particles that are alone have p = 0.
 
@@ -70,7 +71,7 @@ impl<const D: usize> Solution<D> {
         let (laplacian, derived) = (&terms.pressure_laplacian, &terms.derived);
         let factor = step.settings.density / step.time_step;
         frame.stencil.for_each_one(Divergence(&self.felt), &mut self.source, |i, divergence, out| {
-            *out = (1.0 - share) * laplacian[i] - factor * surface.wholeness(i) * (divergence - derived[i].solenoidal);
+            *out = (1.0 - share) * laplacian[i] - factor * surface.weight[i] * (divergence - derived[i].solenoidal);
         });
     }
 }
