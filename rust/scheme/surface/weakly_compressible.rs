@@ -5,9 +5,9 @@
 //! ```
 //!
 //! by leaps of p over u: that of r^n takes p from n−½ to n+½, whose gradient takes u from n to n+1. So the pressure that is kept is the one that
-//! acts: cut off at that of the air, another would carry less than the weight. With w a particle whose support is cut is softer: so the sum over pairs is no stiffer there
-//! than inside. In what diffuses air is beyond the surface, so that water at rest is left as it is; where the fluid is whole Antuono's form
-//! takes off ∇·∇p, what p − ρg·r has of it.
+//! acts: cut off at that of the air, another would carry less than the weight. With w a particle whose support is cut is softer, so that the
+//! sum over pairs is no stiffer there than inside. In what diffuses air is beyond the surface, so that water at rest is left as it is; where
+//! the fluid is whole Antuono's form takes off ∇·∇p, what p − ρg·r has of it.
 
 use super::{Pressure, Terms};
 use crate::base::{Vector, parallel};
