@@ -100,7 +100,9 @@ impl<const D: usize> Poisson<D> {
                 self.inverse_diagonal.resize(particles.real, 0.0);
                 frame.stencil.for_each_one(LaplacianDiagonal, &mut self.inverse_diagonal, |i, diagonal, inverse| {
                     let diagonal = surface.map_or(diagonal, |surface| surface.laplacian_diagonal(i, diagonal));
-                    *inverse = if rows[i] == Row::Solved { -1.0 / diagonal } else { 0.0 };
+                    // As much as a particle may push with: where neighbours are too close a whole step is too much.
+                    let share = surface.map_or(1.0, |surface| surface.weight[i]);
+                    *inverse = if rows[i] == Row::Solved { -share / diagonal } else { 0.0 };
                 });
             }
             Solver::Multigrid | Solver::Bicgstab => {

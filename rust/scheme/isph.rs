@@ -53,7 +53,7 @@ impl Solve {
         Self { solver: Solver::Jacobi, goal: Goal { tolerance: 0.0, max_iterations: sweeps, damping }, relaxed }
     }
 
-    fn is_explicit(&self) -> bool {
+    pub fn is_explicit(&self) -> bool {
         self.relaxed.is_finite()
     }
 

@@ -69,9 +69,11 @@ impl<const D: usize> Solution<D> {
         let Flow { particles, frame, surface, .. } = flow;
         frame.images.blank(&mut self.source, particles.real);
         let (laplacian, derived) = (&terms.pressure_laplacian, &terms.derived);
+        // Jacobi's iteration takes the share of all.
+        let weight = |i: usize| if self.solve.is_explicit() { 1.0 } else { surface.weight[i] };
         let factor = step.settings.density / step.time_step;
         frame.stencil.for_each_one(Divergence(&self.felt), &mut self.source, |i, divergence, out| {
-            *out = (1.0 - share) * laplacian[i] - factor * surface.weight[i] * (divergence - derived[i].solenoidal);
+            *out = (1.0 - share) * laplacian[i] - factor * weight(i) * (divergence - derived[i].solenoidal);
         });
     }
 }
