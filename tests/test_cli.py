@@ -84,7 +84,7 @@ def test_what_is_not_used_is_not_loaded(program, loaded):
         ("alsph run cyl", ["cylinder", "cylinder_pair"]),
         ("alsph run cylinder --scheme ", ["alsph", "isph", "explicit_isph", "wcsph", "edac", "shadloo", "sisph"]),
         ("alsph run cylinder --algorithm m", ["midpoint"]),
-        ("alsph run dam_break --s", ["--sweep-weights", "--smoothing-ratio"]),
+        ("alsph run dam_break --sm", ["--smoothing-ratio"]),
         ("alsph plot runs/a --field v", ["vorticity", "velocity", "velocity_divergence"]),
         ("alsph plot runs/a --format p", ["png", "pdf"]),
         ("alsph export runs/a --to ", ["vtkhdf", "netcdf", "csv"]),

@@ -47,7 +47,7 @@ class Series(ABC):
     def record(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> None:
         """Keep them."""
         numbers = simulation.time, *self.values(simulation)
-        self.rows.append(",".join(f"{number:.9g}" for number in numbers) + "\n")
+        self.rows.append(",".join(map(_digits, numbers)) + "\n")
 
     def append(self, path: Path) -> None:
         """Append what has been kept to the file."""
@@ -60,8 +60,9 @@ class Series(ABC):
     def truncate(self, path: Path, time: float) -> None:
         """Drop what is later than `time`, and a line that was cut."""
         head, rows = _lines(path)
+        last = float(_digits(time))  # a line of that very time may be rounded up
         new = path.with_name(f"{path.name}.new")
-        new.write_text("".join(head + [row for row in rows if _time(row) <= time]), encoding="utf-8")
+        new.write_text("".join(head + [row for row in rows if _time(row) <= last]), encoding="utf-8")
         new.replace(path)
 
     @classmethod
@@ -80,6 +81,11 @@ def _lines(path: Path) -> tuple[list[str], list[str]]:
     lines = [line for line in path.read_text(encoding="utf-8").splitlines(keepends=True) if line.endswith("\n")]
     first = 1 if lines and np.isnan(_time(lines[0])) else 0
     return lines[:first], lines[first:]
+
+
+def _digits(number: float) -> str:
+    """Return a number as files have it."""
+    return f"{number:.9g}"
 
 
 def _time(line: str) -> float:
