@@ -100,8 +100,8 @@ impl<const D: usize> Poisson<D> {
                 self.inverse_diagonal.resize(particles.real, 0.0);
                 frame.stencil.for_each_one(LaplacianDiagonal, &mut self.inverse_diagonal, |i, diagonal, inverse| {
                     let diagonal = surface.map_or(diagonal, |surface| surface.laplacian_diagonal(i, diagonal));
-                    // As much as a particle may push with: where neighbours are too close a whole step is too much.
-                    let share = surface.map_or(1.0, |surface| surface.weight[i]);
+                    // As much as a particle may push with: where impacts press neighbours together a whole step is too much.
+                    let share = surface.filter(|_| settings.splashes()).map_or(1.0, |surface| surface.weight[i]);
                     *inverse = if rows[i] == Row::Solved { -share / diagonal } else { 0.0 };
                 });
             }

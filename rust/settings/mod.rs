@@ -182,6 +182,12 @@ impl Settings {
         self.domain.validate(self.dimensions, self.support_radius())
     }
 
+    /// Whether the fluid has a free surface and no tension, so that it may splash. What is thin keeps a pressure below that of the air too long
+    /// where Jacobi's steps are as short as a splash needs them.
+    pub fn splashes(&self) -> bool {
+        self.free_surface.is_some_and(|own| !own.tension)
+    }
+
     fn validate_free_surface(&self) -> Result<()> {
         let has = |sides: [Boundary; 2]| self.domain.boundaries.iter().flatten().any(|side| sides.contains(side));
         let Some(surface) = self.free_surface else {

@@ -69,8 +69,9 @@ impl<const D: usize> Solution<D> {
         let Flow { particles, frame, surface, .. } = flow;
         frame.images.blank(&mut self.source, particles.real);
         let (laplacian, derived) = (&terms.pressure_laplacian, &terms.derived);
-        // Jacobi's iteration takes the share of all.
-        let weight = |i: usize| if self.solve.is_explicit() { 1.0 } else { surface.weight[i] };
+        // Jacobi's iteration takes the share of all where water splashes.
+        let whole = self.solve.is_explicit() && step.settings.splashes();
+        let weight = |i: usize| if whole { 1.0 } else { surface.weight[i] };
         let factor = step.settings.density / step.time_step;
         frame.stencil.for_each_one(Divergence(&self.felt), &mut self.source, |i, divergence, out| {
             *out = (1.0 - share) * laplacian[i] - factor * weight(i) * (divergence - derived[i].solenoidal);
