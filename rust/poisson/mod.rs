@@ -1,7 +1,8 @@
 //! The pressure Poisson equation −∇²x = f of the particles, with the compact Laplacian (16), matrix-free.
 //!
 //! Outlets have x = 0. Solid particles show the mean of the fluid around, ∂x/∂n = 0; what flux a wall has belongs to the right-hand side
-//! ([`crate::boundary::add_wall_flux`]). Beside a free surface the neighbours that are missing are air, at x = 0. In a domain without outlet and air x is found up to a constant, and f less its mean is solved.
+//! ([`crate::boundary::add_wall_flux`]). Beside a free surface the neighbours that are missing are air, at x = 0. In a domain without outlet
+//! and air x is found up to a constant, and f less its mean is solved.
 //!
 //! All sums are exact, so that neither the number of threads nor the order of the particles changes a bit.
 

@@ -9,7 +9,8 @@
 //! Beyond walls the pressure goes on with the hydrostatic slope, beyond the surface is air: what both add to ∇² without any p belongs to the
 //! right-hand side. Particles that are alone have p = 0.
 
-use super::{Pressure, Terms, mirror};
+use super::solids::mirror;
+use super::{Pressure, Terms};
 use crate::base::{Vector, parallel};
 use crate::discretisation::Divergence;
 use crate::flow::{Flow, Step};
