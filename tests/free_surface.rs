@@ -1,7 +1,9 @@
 //! Fluids with a free surface: operators where the support of a particle is cut, what is found to be the surface, and what a step keeps.
 
 use alsph::base::Tensor;
-use alsph::discretisation::{AdjointGradient, ConservativeGradient, Divergence, LaplacianAndItsSum, LaplacianDiagonal};
+use alsph::discretisation::{
+    AdjointGradient, ConservativeGradient, Divergence, LaplacianAndItsSum, LaplacianDiagonal, Roughness, VelocityGradient,
+};
 use alsph::frame::{Frame, Travel};
 use alsph::motion::Pose;
 use alsph::settings::{Settings, Solver};
@@ -23,8 +25,7 @@ fn settings<const D: usize>(sides: &str, gradient: &str) -> Settings {
     let mut value = common::settings_value::<D>(SPACING, sides);
     let mut force = vec![0.0; D];
     force[D - 1] = -1.0;
-    let surface =
-        json!({"reference_velocity": 1, "pressure_gradient": gradient, "tension": false, "packing_relaxation": 0.05});
+    let surface = json!({"reference_velocity": 1, "pressure_gradient": gradient, "tension": false, "packing_relaxation": 0.05, "artificial_viscosity": 0.05});
     let others = json!({
         "free_surface": surface, "body_force": force, "derivative_frame": "midpoint", "shifting": "none",
         "wall_pressure": "linear", "penalty_constant": null, "courant": 0.2, "time_step": 1, "viscous_theta": 0.5,
@@ -136,6 +137,67 @@ proptest! {
         let torque: f64 = force.iter().zip(&particles.position).map(|(f, x)| x[0] * f[1] - x[1] * f[0]).sum();
         prop_assert!(sum.norm() < 1e-6 * size && torque.abs() < 1e-6 * size, "{sum} {torque} of {size}");
     }
+}
+
+/// What the artificial viscosity does to velocities, not less thinly surrounded ones.
+fn roughness<const D: usize>(particles: &mut Particles<D>, frame: &Frame<D>) -> Vec<Vector<D>> {
+    frame.images.fill(&mut particles.velocity);
+    let (velocity, count) = (&particles.velocity, particles.len());
+    let mut gradient = vec![Tensor(Matrix::<D>::zeros()); count];
+    frame.stencil.for_each_one(VelocityGradient(velocity), frame.images.real(&mut gradient), |_, value, out| out.0 = value);
+    frame.images.fill(&mut gradient);
+    let mut found = vec![Vector::zeros(); particles.real];
+    let operator = Roughness { velocity, gradient: &gradient, weight: &vec![1.0; count] };
+    frame.stencil.for_each_one(operator, &mut found, |_, value, out| *out = value);
+    found
+}
+
+fn artificial_viscosity_is_of_roughness_alone<const D: usize>(counts: [usize; D], seed: u64) {
+    let settings = settings::<D>("air", "adjoint");
+    // A linear flow has none, but for neighbours of those at the surface, where α⁻¹ is bounded.
+    let linear =
+        |x: &Vector<D>| Vector::from_fn(|k, _| 0.3 + (0..D).map(|l| (k as f64 - 2.0 * l as f64) * x[l]).sum::<f64>());
+    let (mut particles, frame, _) = found(&settings, fluid(block([1.0; D], counts, 0.2, seed), linear));
+    let is_within = |x: &Vector<D>| (0..D).all(|k| (0.55..counts[k] as f64 * SPACING - 0.55).contains(&(x[k] - 1.0)));
+    for (i, rough) in roughness(&mut particles, &frame).into_iter().enumerate() {
+        let x = &particles.position[i];
+        assert!(!is_within(x) || rough.norm() < 1e-3, "{rough} at {x}");
+    }
+    // What goes from particle to particle it takes, and momentum it keeps.
+    let mut sign = 1.0;
+    particles.velocity.iter_mut().for_each(|u| {
+        sign = -sign;
+        *u = Vector::from_fn(|k, _| sign * (k as f64 + 1.0));
+    });
+    let rough = roughness(&mut particles, &frame);
+    let (size, sum): (f64, Vector<D>) = (rough.iter().map(|r| r.norm()).sum(), rough.iter().sum());
+    assert!(sum.norm() < 1e-6 * size, "{sum} of {size}");
+    let work: f64 = rough.iter().zip(&particles.velocity).map(|(r, u)| r.dot(u)).sum();
+    let energy: f64 = particles.velocity[..particles.real].iter().map(|u| u.norm_squared()).sum();
+    assert!(work < -energy / SPACING.powi(2), "{work} of {energy}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+    #[test]
+    fn artificial_viscosity_takes_what_goes_from_particle_to_particle_alone(seed in 0u64..1000) {
+        artificial_viscosity_is_of_roughness_alone::<2>([20, 16], seed);
+        artificial_viscosity_is_of_roughness_alone::<3>([13, 14, 13], seed);
+    }
+}
+
+#[test]
+fn artificial_viscosity_is_of_fourth_order_in_a_smooth_flow() {
+    let of = |wavelength: f64| {
+        let settings = settings::<2>("air", "adjoint");
+        let wave = |x: &Vector<2>| Vector::<2>::new(0.0, (x[0] * std::f64::consts::TAU / wavelength).sin());
+        let (mut particles, frame, _) = found(&settings, fluid(block([0.5; 2], [30, 30], 0.0, 0), wave));
+        let rough = roughness(&mut particles, &frame);
+        let middle = |x: &Vector<2>| x.iter().all(|x| (1.1..2.9).contains(x));
+        let size = |i: usize| if middle(&particles.position[i]) { rough[i].norm() } else { 0.0 };
+        (0..particles.real).map(size).fold(0.0, f64::max)
+    };
+    assert_relative_eq!(of(1.6) / of(3.2), 16.0, max_relative = 0.1);
 }
 
 #[test]

@@ -10,7 +10,7 @@ pub use correction::Correction;
 pub use operator::{Neighbours, Nothing, Operator};
 pub use operators::{
     AdjointGradient, ConservativeGradient, Divergence, Gradient, GradientAndLaplacian, Laplacian, LaplacianAndGradient,
-    LaplacianAndItsSum, LaplacianDiagonal, Largest, Surroundings, VelocityGradient,
+    LaplacianAndItsSum, LaplacianDiagonal, Largest, Roughness, Surroundings, VelocityGradient,
 };
 pub use printed::vector_laplacian;
 pub use stencil::{Corrected, Stencil};

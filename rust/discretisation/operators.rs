@@ -41,6 +41,15 @@ pub struct AdjointGradient<'a, const D: usize, F> {
     pub own: F,
 }
 
+/// −2 Σ slope w_i w_j (u_j − u_i + ½ (∇u_i + ∇u_j) r_ij) over what flows: a Laplacian of what a field does beside being linear from one
+/// particle to the next, of fourth order in smooth fields.
+pub struct Roughness<'a, const D: usize> {
+    pub velocity: &'a [Vector<D>],
+    pub gradient: &'a [Tensor<D>],
+    /// w.
+    pub weight: &'a [f64],
+}
+
 /// ∇²f as [`Laplacian`], and −2 Σ slope (f_i − f_j) without a correction.
 pub struct LaplacianAndItsSum<'a>(pub &'a [f64]);
 
@@ -117,6 +126,35 @@ impl<const D: usize, F: Fn(usize) -> f64 + Sync> Operator<D> for AdjointGradient
             },
         );
         vectors(gradient)
+    }
+}
+
+impl<const D: usize> Operator<D> for Roughness<'_, D> {
+    type Value = Vector<D>;
+
+    #[inline(always)]
+    fn apply<V: Lanes>(&self, near: &mut impl Neighbours<V, D>) -> [Vector<D>; LANES] {
+        let Self { velocity, gradient, weight } = *self;
+        let cluster = near.cluster();
+        let (here, own): ([V; D], V) = (cluster.vectors(velocity), cluster.lanes(|i| -2.0 * weight[i]));
+        let bent: [[V; D]; D] = std::array::from_fn(|k| std::array::from_fn(|l| cluster.lanes(|i| gradient[i].0[(k, l)])));
+        let mut sum = [V::zero(); D];
+        near.for_each_flowing(
+            #[inline(always)]
+            |j, slope: V, r_ij| {
+                let factor = slope * own * V::splat(weight[j]);
+                for k in 0..D {
+                    let mut linear = V::zero();
+                    for l in 0..D {
+                        linear = linear.plus_product(V::splat(gradient[j].0[(k, l)]) + bent[k][l], r_ij[l]);
+                    }
+                    let rest = (V::splat(velocity[j][k]) - here[k]).plus_product(linear, V::splat(0.5));
+                    sum[k] = sum[k].plus_product(rest, factor);
+                }
+            },
+        );
+        near.corrections();
+        vectors(sum)
     }
 }
 

@@ -84,6 +84,8 @@ pub struct FreeSurface {
     pub tension: bool,
     /// α: how much of a number density above the lattice's a step takes off beside ∇·u.
     pub packing_relaxation: f64,
+    /// Of what velocities do between two particles beside being linear [U₀ Δx].
+    pub artificial_viscosity: f64,
 }
 
 impl FreeSurface {
@@ -92,9 +94,11 @@ impl FreeSurface {
             let problem = format!("must be a positive number, not {}", self.reference_velocity);
             return Err(setting("free_surface.reference_velocity", problem));
         }
-        if !(0.0..=1.0).contains(&self.packing_relaxation) {
-            let problem = format!("must lie in 0..1, not {}", self.packing_relaxation);
-            return Err(setting("free_surface.packing_relaxation", problem));
+        let shares = [("packing_relaxation", self.packing_relaxation), ("artificial_viscosity", self.artificial_viscosity)];
+        for (name, share) in shares {
+            if !(0.0..=1.0).contains(&share) {
+                return Err(setting(format!("free_surface.{name}"), format!("must lie in 0..1, not {share}")));
+            }
         }
         Ok(())
     }

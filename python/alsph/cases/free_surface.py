@@ -201,6 +201,13 @@ class FreeSurface(Case):
         description="share of a number density above the lattice's that a step takes off; if not given 0.05 where "
         "water splashes, 0.015 of wcsph and edac, whose steps are short, else 0 [-]",
     )
+    artificial_viscosity: float = Field(
+        default=0.05,
+        ge=0,
+        le=1,
+        description="viscosity against what velocities do from particle to particle, which a linear flow does not feel, "
+        "nor a smooth one but in fourth order [UΔx]",
+    )
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
@@ -236,6 +243,7 @@ class FreeSurface(Case):
                 "pressure_gradient": self.pressure_gradient or ("conservative" if self.checked_bodies else "adjoint"),
                 "tension": self.tension,
                 "packing_relaxation": relaxation if self.packing_relaxation is None else self.packing_relaxation,
+                "artificial_viscosity": self.artificial_viscosity,
             }
         }
 

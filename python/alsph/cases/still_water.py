@@ -35,8 +35,8 @@ class StillWater(FreeSurface):
 
     @property
     def default_until(self) -> float:
-        """Some five periods of the tank's longest wave."""
-        return 10.0
+        """Long enough for what the scheme stirs up to grow."""
+        return 50.0
 
     def domain(self) -> Domain:
         """Return the tank, whose top is open."""

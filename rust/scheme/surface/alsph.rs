@@ -35,18 +35,16 @@ impl Penalty {
         terms.form_tensor(step.settings, flow);
         let Flow { particles, frame, before, .. } = flow;
         let condition = conditions(step.settings);
-        let (dt, viscosity, penalty) = (step.time_step, step.settings.kinematic_viscosity, self.penalty);
+        let (dt, penalty) = (step.time_step, self.penalty);
         frame.images.blank(&mut terms.velocity_star, particles.len());
-        let derived = &terms.derived;
+        let friction = &terms.friction;
         frame.stencil.for_each_one(
             AdjointGradient { tensor: &terms.tensor, own: |_| 1.0 },
             frame.images.real(&mut terms.velocity_star),
             |i, gradient, star| {
                 *star = match condition(particles.kind[i], &particles.position[i]).velocity {
                     VelocityRule::Kept => particles.velocity[i],
-                    VelocityRule::Solved => {
-                        before.velocity[i] + (gradient * penalty + derived[i].laplacian * viscosity) * dt
-                    }
+                    VelocityRule::Solved => before.velocity[i] + (gradient * penalty + friction[i]) * dt,
                 };
             },
         );

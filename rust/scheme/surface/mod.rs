@@ -13,6 +13,7 @@
 //! gradients of w q its mean, of p its mean continued with the hydrostatic slope. The viscous term sees the wall's velocity by its rule.
 
 mod alsph;
+mod friction;
 mod isph;
 mod solids;
 mod weakly_compressible;
@@ -92,6 +93,8 @@ pub struct Terms<const D: usize> {
     surface_pressure: Vec<f64>,
     /// ∇·u less θ.
     divergence: Vec<f64>,
+    /// ν∇²u and what the artificial viscosity does.
+    friction: Vec<Vector<D>>,
     /// What G* is taken of.
     tensor: Vec<Tensor<D>>,
     /// w q, and u as the divergence sees it, if there are solids.
@@ -112,6 +115,7 @@ impl<const D: usize> Terms<D> {
             strain_rate: Vec::new(),
             surface_pressure: Vec::new(),
             divergence: Vec::new(),
+            friction: Vec::new(),
             tensor: Vec::new(),
             pushed: Vec::new(),
             mirrored: Vec::new(),
@@ -123,7 +127,7 @@ impl<const D: usize> Terms<D> {
     /// What all of a step begins with: the terms of u^n, the solids' velocity at n+1, and the pressure that they show.
     fn begin(&mut self, step: Step, flow: &mut Flow<D>) {
         self.derive(step, flow);
-        self.free_of_stress(step, flow);
+        self.find_friction(step, flow);
         flow.move_solids();
         self.extend_pressure(step, flow);
     }
@@ -142,7 +146,7 @@ impl<const D: usize> Terms<D> {
         }
     }
 
-    /// What ∇·u^{n+1} is to be in the frame, and ∇²u^n.
+    /// What ∇·u^{n+1} is to be in the frame, ∇²u^n, and ∇u^n as `tensor`.
     fn derive(&mut self, step: Step, flow: &mut Flow<D>) {
         let Flow { particles, frame, surface, walls, .. } = flow;
         walls.see(step.settings, particles, frame);
@@ -150,56 +154,26 @@ impl<const D: usize> Terms<D> {
         frame.images.blank(&mut self.derived, particles.real);
         frame.images.blank(&mut self.divergence, particles.len());
         frame.images.blank(&mut self.strain_rate, particles.real);
+        frame.images.blank(&mut self.tensor, particles.len());
         let (velocity, loosening) = (&particles.velocity, self.loosening(step, frame, surface));
         frame.stencil.for_each(
             LaplacianAndGradient { velocity, seen: |s, i| walls.seen_by(particles, s, i) },
             &mut self.derived,
-            &mut self.strain_rate,
-            |i, (laplacian, gradient), derived, strain_rate| {
+            frame.images.real(&mut self.tensor),
+            |i, (laplacian, gradient), derived, tensor| {
                 let bent = step.settings.derivative_frame.solenoidal_divergence(&gradient, step.time_step);
                 *derived = Derived { laplacian, solenoidal: bent + loosening(i) };
-                strain_rate.0 = (gradient + gradient.transpose()) * 0.5;
+                tensor.0 = gradient;
             },
         );
-        let (strain_rate, derived) = (&self.strain_rate, &self.derived);
+        let (gradient, derived) = (&self.tensor, &self.derived);
+        parallel::for_each(&mut self.strain_rate, |i, strain_rate| {
+            strain_rate.0 = (gradient[i].0 + gradient[i].0.transpose()) * 0.5;
+        });
+        let strain_rate = &self.strain_rate;
         parallel::for_each(frame.images.real(&mut self.divergence), |i, divergence| {
             *divergence = strain_rate[i].0.trace() - derived[i].solenoidal;
         });
-    }
-
-    /// The viscous term next to the surface, where no stress acts on the fluid from outside: of the stress 2ν S it is what the pressure's
-    /// gradient is of the pressure, so that Σ u·(term) is minus what 2ν S:S takes. And the pressure that answers the stress there.
-    fn free_of_stress(&mut self, step: Step, Flow { particles, frame, surface, .. }: &Flow<D>) {
-        let viscosity = step.settings.kinematic_viscosity;
-        frame.images.blank(&mut self.surface_pressure, particles.real);
-        let strain_rate = &self.strain_rate;
-        parallel::for_each(&mut self.surface_pressure, |i, pressure| {
-            let normal = surface.normal(i);
-            *pressure = if surface.place[i].sees_air() {
-                2.0 * step.settings.density * viscosity * (strain_rate[i].0 * normal).dot(&normal)
-            } else {
-                0.0
-            };
-        });
-        if viscosity == 0.0 {
-            return;
-        }
-        frame.images.blank(&mut self.tensor, particles.len());
-        parallel::for_each(frame.images.real(&mut self.tensor), |i, tensor| {
-            tensor.0 = strain_rate[i].0 * frame.stencil.correction[i].inverse * 2.0;
-        });
-        frame.images.fill(&mut self.tensor);
-        frame.stencil.for_each_one(
-            AdjointGradient { tensor: &self.tensor, own: |_| 1.0 },
-            &mut self.derived,
-            |i, value, derived| {
-                // What a wall does to the stress solids do not tell.
-                let is_free = frame.stencil.solids_near(step.settings, i).next().is_none();
-                if surface.place[i].sees_air() && is_free {
-                    derived.laplacian = value;
-                }
-            },
-        );
     }
 
     /// w q B of all particles, from the divergence of the fluid.
@@ -255,17 +229,16 @@ impl<const D: usize> Terms<D> {
         fill(particles);
     }
 
-    /// u* of the viscous term alone. Solids keep their velocities.
+    /// u* of friction alone. Solids keep their velocities.
     fn predict_velocity(&mut self, step: Step, flow: &Flow<D>) {
         let Flow { particles, frame, before, .. } = flow;
         let condition = conditions(step.settings);
-        let factor = step.settings.kinematic_viscosity * step.time_step;
         frame.images.blank(&mut self.velocity_star, particles.len());
-        let derived = &self.derived;
+        let (friction, dt) = (&self.friction, step.time_step);
         parallel::for_each(frame.images.real(&mut self.velocity_star), |i, star| {
             *star = match condition(particles.kind[i], &particles.position[i]).velocity {
                 VelocityRule::Kept => particles.velocity[i],
-                VelocityRule::Solved => before.velocity[i] + derived[i].laplacian * factor,
+                VelocityRule::Solved => before.velocity[i] + friction[i] * dt,
             };
         });
         self.show_predicted(step.settings, flow);
