@@ -32,6 +32,7 @@ from alsph.cases.dam_break_obstacle import DamBreakObstacle
 from alsph.cases.elliptical_drop import EllipticalDrop
 from alsph.cases.floating_box import FloatingBox
 from alsph.cases.free_surface import FreeSurface
+from alsph.cases.heaving_cylinder import HeavingCylinder
 from alsph.cases.moving_cylinder import MovingCylinder
 from alsph.cases.nozzle import Nozzle
 from alsph.cases.oscillating_cylinder import OscillatingCylinder
@@ -68,6 +69,7 @@ CASES: dict[str, type[Case]] = {
             Sloshing,
             RollingTank,
             FloatingBox,
+            HeavingCylinder,
             EllipticalDrop,
             RotatingPatch,
         ),
@@ -93,6 +95,7 @@ __all__ = [
     "Domain",
     "EllipticalDrop",
     "FloatingBox",
+    "HeavingCylinder",
     "FreeSurface",
     "MovingCylinder",
     "Nozzle",

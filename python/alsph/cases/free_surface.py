@@ -205,8 +205,8 @@ class FreeSurface(Case):
         default=0.05,
         ge=0,
         le=1,
-        description="viscosity against what velocities do from particle to particle, which a linear flow does not feel, "
-        "nor a smooth one but in fourth order [UΔx]",
+        description="viscosity against what velocities do from particle to particle; a linear flow does not feel it, "
+        "a smooth one in fourth order [UΔx]",
     )
 
     @classmethod

@@ -110,6 +110,18 @@ class Enclosed(Planar):
         return -super().height(points)
 
 
+@dataclass(frozen=True, eq=False)
+class Immersed(Planar):
+    """A body of the plane that reaches out of the box of cells, where its area is `within`."""
+
+    within: float
+
+    @property
+    def volume(self) -> float:
+        """Its area in the box."""
+        return self.within
+
+
 def pack_around(cells: FloatArray, bodies: Polygon | MultiPolygon, solid: FloatArray, spacing: float) -> FloatArray:
     """Return fluid particles (m, 2) around bodies of the plane and in their holes, as :func:`pack` does."""
     found = [pack(cells, Planar(filled(bodies)), solid, spacing)]
