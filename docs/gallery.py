@@ -33,6 +33,9 @@ FIELDS = {
 }
 """The field of those pictures that show neither a profile nor the vorticity past a body."""
 
+PROFILES = {"heaving_cylinder"}
+"""Cases with a body whose picture is a profile."""
+
 
 def commands() -> dict[str, list[str]]:
     """Return the command of each case in gallery.md."""
@@ -52,7 +55,7 @@ def compute(case: str, arguments: list[str]) -> None:
 def draw(case: str) -> None:
     """Save the picture of a run: the profile where it has one, a field otherwise."""
     run = alsph.open_run(RUNS / case)
-    profile = next((each for each in run.profiles if case not in FIELDS and not run.body), None)
+    profile = next((each for each in run.profiles if case in PROFILES or not (case in FIELDS or run.body)), None)
     figure = run.plot_profile(profile) if profile else run.plot_field(FIELDS.get(case, "vorticity"))
     figure.savefig(HERE / "images" / "gallery" / f"{case}.png", dpi=65, pil_kwargs={"optimize": True})
 
