@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 from alsph import _alsph
-from alsph.cases import CASES, Body, Cylinder, TaylorGreen
+from alsph.cases import CASES, Body, Cylinder, FreeSurface, TaylorGreen
 from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind
 from alsph.geometry.solids import cylinder_rings
@@ -76,10 +76,12 @@ def test_initial_vortex_is_divergence_free_and_can_be_left_out():
 @pytest.mark.parametrize("model", CASES.values())
 def test_engine_accepts_the_settings_and_the_estimate_is_close(model):
     case = model()
-    limits = _alsph.time_step_limits(json.dumps(case.replace(penalty_constant=100.0).settings()), 1.0)
-    assert 0.09 < limits["penalty"] / case.particle_spacing < 0.1 and limits["courant"] == np.inf
-    limits = _alsph.time_step_limits(json.dumps(case.settings()), 1.0)
-    assert limits["courant"] / case.particle_spacing == pytest.approx(case.courant) and limits["penalty"] == np.inf
+    speed = case.reference_velocity if issubclass(model, FreeSurface) else 1.0
+    limits = _alsph.time_step_limits(json.dumps(case.replace(penalty_constant=100.0).settings()), speed)
+    assert 0.09 < limits["penalty"] * speed / case.particle_spacing < 0.1 and limits["courant"] == np.inf
+    limits = _alsph.time_step_limits(json.dumps(case.settings()), speed)
+    courant = limits["courant"] * speed / case.particle_spacing
+    assert courant == pytest.approx(case.courant) and limits["penalty"] == np.inf
     assert case.particle_estimate() == pytest.approx(len(case.particles()["kind"]), rel=0.02)
 
 
