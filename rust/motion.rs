@@ -16,8 +16,8 @@
 //! ```
 //!
 //! and an error of A falls by |M̂ − M_a|/(M + M̂) a step. Where the pressure travels as waves of a speed c, as in the other schemes, a surface S
-//! that changes its velocity feels −ρ c S of that at once, and the rest comes with the waves; with an acceleration Ā that follows A slowly, so
-//! that it makes no difference to smooth motion,
+//! that changes its velocity feels −ρ c S of that at once, and the rest comes with the waves; with an acceleration Ā that follows A slowly,
+//! and goes on as A changes, so that it makes no difference to smooth motion (one that lags behind would add energy to what swings),
 //!
 //! ```text
 //! (M + ρ c S Δt) A^{n+1} = F^n + ρ c S Δt Ā^n.
@@ -57,13 +57,15 @@ pub struct Pose {
     pub spin: Vector3<f64>,
     pub acceleration: Vector3<f64>,
     pub angular_acceleration: Vector3<f64>,
-    /// What follows the two slowly, of a free body.
+    /// What follows the two slowly, of a free body, and how far it is behind.
     pub mean_acceleration: Vector3<f64>,
     pub mean_angular_acceleration: Vector3<f64>,
+    pub lag: Vector3<f64>,
+    pub angular_lag: Vector3<f64>,
 }
 
 /// The numbers of a pose.
-pub const NUMBERS: usize = 24;
+pub const NUMBERS: usize = 30;
 
 impl Pose {
     /// From its numbers, in the order of its fields.
@@ -78,6 +80,8 @@ impl Pose {
             angular_acceleration: three(5),
             mean_acceleration: three(6),
             mean_angular_acceleration: three(7),
+            lag: three(8),
+            angular_lag: three(9),
         }
     }
 
@@ -91,6 +95,8 @@ impl Pose {
             self.angular_acceleration,
             self.mean_acceleration,
             self.mean_angular_acceleration,
+            self.lag,
+            self.angular_lag,
         ];
         std::array::from_fn(|k| all[k / 3][k % 3])
     }
@@ -458,7 +464,7 @@ impl Pose {
         let damper = of(damping).component_mul(&(self.velocity + self.acceleration * ahead));
         let total = force + of(own) - spring - damper;
         let moves = |k: usize| k < D && free[k];
-        let acceleration = (total + self.mean_acceleration * added_mass) / (mass + added_mass);
+        let acceleration = (total + (self.mean_acceleration + self.lag) * added_mass) / (mass + added_mass);
         self.acceleration = Vector3::from_fn(|k, _| if moves(k) { acceleration[k] } else { 0.0 });
         let turn = Rotation3::from_scaled_axis(self.angle);
         let own_axes = match inertia[..] {
@@ -467,7 +473,7 @@ impl Pose {
         };
         let inertia = turn * own_axes * turn.inverse();
         let gyroscopic = if D == 2 { Vector3::zeros() } else { self.spin.cross(&(inertia * self.spin)) };
-        let mut twist = torque - gyroscopic + self.mean_angular_acceleration * added_inertia;
+        let mut twist = torque - gyroscopic + (self.mean_angular_acceleration + self.angular_lag) * added_inertia;
         let mut inertia = inertia + Matrix3::identity() * added_inertia;
         // About the other axes what holds the body answers any torque.
         for k in (0..3).filter(|&k| if D == 2 { k < 2 || !free[2] } else { !free[3 + k] }) {
@@ -477,9 +483,16 @@ impl Pose {
         self.angular_acceleration = inertia.try_inverse().map_or_else(Vector3::zeros, |inverse| inverse * twist);
     }
 
+    /// Let the means follow by a share, all of it without a lag. What they are behind by in the mean is added, so that they are right where
+    /// accelerations change evenly.
     fn follow(&mut self, share: f64) {
-        self.mean_acceleration += (self.acceleration - self.mean_acceleration) * share;
-        self.mean_angular_acceleration += (self.angular_acceleration - self.mean_angular_acceleration) * share;
+        let follow = |mean: &mut Vector3<f64>, lag: &mut Vector3<f64>, now: Vector3<f64>| {
+            let behind = now - *mean;
+            *lag = if share < 1.0 { *lag + (behind - *lag) * share } else { Vector3::zeros() };
+            *mean += behind * share;
+        };
+        follow(&mut self.mean_acceleration, &mut self.lag, self.acceleration);
+        follow(&mut self.mean_angular_acceleration, &mut self.angular_lag, self.angular_acceleration);
     }
 }
 

@@ -199,7 +199,7 @@ impl PySimulation {
     }
 
     /// Ask functions, once a step, for a body force per unit mass beside that of the settings, and the velocity of surfaces that stay
-    /// in place: (m, d) from positions (m, d) and the time; and one for the poses (b, 24) of the b bodies that move and are not free, from
+    /// in place: (m, d) from positions (m, d) and the time; and one for the poses (b, 30) of the b bodies that move and are not free, from
     /// the time.
     #[pyo3(signature = (forcing, sliding, motion))]
     fn prescribe(&mut self, forcing: Option<Py<PyAny>>, sliding: Option<Py<PyAny>>, motion: Option<Py<PyAny>>) {

@@ -304,7 +304,7 @@ fn motions_that_cannot_be_are_refused() {
     let error = simulation(&value, &particles, nan).advance_until(1.0, None).expect_err("NaN").to_string();
     assert!(error.contains("not finite"), "{error}");
     let error = simulation(&value, &particles, None).set_poses(&[]).expect_err("no body").to_string();
-    assert!(error.contains("24 finite numbers for each of 1 bodies"), "{error}");
+    assert!(error.contains("30 finite numbers for each of 1 bodies"), "{error}");
     for (key, wrong, told) in [
         ("mass", json!(0.0), "rigid.mass"),
         ("inertia", json!([1.0, 2.0]), "rigid.inertia"),

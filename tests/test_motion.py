@@ -31,7 +31,7 @@ def test_velocities_and_accelerations_are_those_of_the_way():
         x, y = position.T
         return np.stack([np.sin(3 * time) * x, time**2 + 0 * y, 0.5 * time**3 + 1 + 0 * y], axis=1)
 
-    found = poses(rule, CENTRES, 0.7).reshape(2, 8, 3)
+    found = poses(rule, CENTRES, 0.7).reshape(2, 10, 3)
     way, angle, velocity, spin, acceleration, turning = found.transpose(1, 0, 2)[:6]
     x = CENTRES[:, 0]
     assert way == pytest.approx(np.stack([np.sin(2.1) * x, [0.49] * 2, [0, 0]], axis=1))
@@ -46,7 +46,9 @@ def test_angles_in_space_are_rotation_vectors_and_turn_about_any_axis():
     def rotation(time):
         return Rotation.from_rotvec([0, 0, 2 * time]) * Rotation.from_rotvec([0.5 * np.sin(time), 0, 0])
 
-    found = poses(lambda position, time: [0, 0, 0, *rotation(time).as_rotvec()], np.zeros((1, 3)), 0.4)[0].reshape(8, 3)
+    found = poses(lambda position, time: [0, 0, 0, *rotation(time).as_rotvec()], np.zeros((1, 3)), 0.4)[0].reshape(
+        10, 3
+    )
     step = 1e-5
     turn = (rotation(0.4 + step) * rotation(0.4 - step).inv()).as_rotvec() / (2 * step)
     assert found[3] == pytest.approx(turn, abs=1e-7)

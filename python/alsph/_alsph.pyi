@@ -77,7 +77,7 @@ class Simulation:
     ) -> None:
         """Ask functions for a body force and the velocity of surfaces: (m, d) from positions and time, once a step.
 
-        And for the poses (b, 24) of the b bodies that move and are not free, from the time, twice a step.
+        And for the poses (b, 30) of the b bodies that move and are not free, from the time, twice a step.
         """
 
     def set_inflow(self, velocity: NDArray[np.float64]) -> None:

@@ -19,7 +19,7 @@ SECOND = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / (12 * INTERVAL**2)
 
 
 def poses(rule: Rule, centres: FloatArray, time: float) -> FloatArray:
-    """Return the poses (b, 24) of bodies that a rule moves from where they are at the time 0.
+    """Return the poses (b, 30) of bodies that a rule moves from where they are at the time 0.
 
     Parameters
     ----------
@@ -34,13 +34,13 @@ def poses(rule: Rule, centres: FloatArray, time: float) -> FloatArray:
     -------
     ndarray
         Displacement, rotation vector, velocity, angular velocity, acceleration and angular acceleration, each of three
-        components, and six that only free bodies have.
+        components, and four of three that only free bodies have.
     """
     start = _placed(rule, centres, 0.0)
     way, turn = zip(*(_placed(rule, centres, time + k * INTERVAL) for k in range(-2, 3)), strict=True)
     angle, away = _about_one_axis(start[1], turn) if centres.shape[1] == 2 else _in_space(start[1], turn)
     rates = [np.tensordot(weights, np.stack(of), 1) for weights in (FIRST, SECOND) for of in (way, away)]
-    return np.hstack([way[2] - start[0], angle, *rates, np.zeros((len(centres), 6))])
+    return np.hstack([way[2] - start[0], angle, *rates, np.zeros((len(centres), 12))])
 
 
 def _about_one_axis(start: FloatArray, turn: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
