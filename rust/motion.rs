@@ -40,8 +40,10 @@ const LAYER: f64 = 0.75;
 /// How far [Δx] from where its velocity takes it a body may be that a rule moves.
 const JUMP: f64 = 0.5;
 
-/// How much of the way to A the slow Ā goes in a step.
+/// How much of the way to A the slow Ā goes in a step, and how much of the way to what it is behind by the lag does: slowly, so that it does not
+/// ring with the waves between a light body and its vessel.
 const FOLLOWING: f64 = 0.1;
+const LAGGING: f64 = 0.02;
 
 /// ρ c S Δt over M up to which a body that sound reaches has no need of that.
 const ACOUSTIC_SHARE: f64 = 0.5;
@@ -488,7 +490,7 @@ impl Pose {
     fn follow(&mut self, share: f64) {
         let follow = |mean: &mut Vector3<f64>, lag: &mut Vector3<f64>, now: Vector3<f64>| {
             let behind = now - *mean;
-            *lag = if share < 1.0 { *lag + (behind - *lag) * share } else { Vector3::zeros() };
+            *lag = if share < 1.0 { *lag + (behind - *lag) * LAGGING } else { Vector3::zeros() };
             *mean += behind * share;
         };
         follow(&mut self.mean_acceleration, &mut self.lag, self.acceleration);
