@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -39,6 +39,7 @@ STEP = 0.05
 """Time step that linear theory is told at [√(R/g)]."""
 
 
+@cache
 def linear_heave(until: float, depth: float, tank_length: float) -> tuple[FloatArray, FloatArray]:
     """Return the motion of the cylinder in a potential flow that disturbs the surface but little.
 

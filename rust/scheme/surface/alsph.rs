@@ -1,10 +1,12 @@
 //! ALSPH beside a free surface: equations (8), (10) and (11).
 //!
 //! ```text
-//! u*    = u^n + Δt (r_AL G*(w q) + ν ∇²u),                        q = ∇·u^m − θ                  (8)
+//! u*    = u^n + Δt (r_AL G*(w q) + ν ∇²u + f),                    q = ∇·u^m − θ                  (8)
 //! p^{m+1} = p^m − r_AL w (ρ (∇·u* − θ) − Δt ∇²p^m)                                              (10)
 //! u^{m+1} = u* + Δt (g − P(p^{m+1})/ρ)                                                            (11)
 //! ```
+//!
+//! with f what the artificial viscosity does.
 
 use super::{Pressure, Terms};
 use crate::boundary::{VelocityRule, conditions};

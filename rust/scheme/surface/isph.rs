@@ -1,11 +1,11 @@
 //! ISPH beside a free surface, with a solve or a few steps of Jacobi's iteration.
 //!
 //! ```text
-//! u* = u^n + Δt ν ∇²u,    ∇²q = ρ/Δt w (∇·(u* + β Δt (g − P(p^n)/ρ)) − θ),    p = β p^n + q,    u^{n+1} = u* + Δt (g − P(p)/ρ)
+//! u* = u^n + Δt (ν ∇²u + f),    ∇²q = ρ/Δt w (∇·(u* + β Δt (g − P(p^n)/ρ)) − θ),    p = β p^n + q,    u^{n+1} = u* + Δt (g − P(p)/ρ)
 //! ```
 //!
-//! with w the weight of a cut support. What the velocity has felt of the old pressure leaves the change to the
-//! operator ∇²: with β = 0 water at rest would be what that takes for it, not what P does, and its surface would creep.
+//! with w the weight of a cut support and f what the artificial viscosity does. What the velocity has felt of the old pressure leaves the
+//! change to the operator ∇²: with β = 0 water at rest would be what that takes for it, not what P does, and its surface would creep.
 //! Beyond walls the pressure goes on with the hydrostatic slope, beyond the surface is air: what both add to ∇² without any p belongs to the
 //! right-hand side. Particles that are alone have p = 0.
 
