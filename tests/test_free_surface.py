@@ -12,6 +12,7 @@ import shapely
 from alsph import Domain, SolidBody, Units, cases, plotting, reference
 from alsph.cases.dam_break import column_pressure
 from alsph.cases.heaving_cylinder import linear_heave
+from alsph.cases.sloshing import irrotational_level
 from alsph.errors import ConfigError
 from alsph.geometry.lattice import cell_centres, lattice
 from alsph.geometry.particles import join
@@ -130,6 +131,25 @@ def test_a_tank_that_sways_a_little_has_the_level_of_linear_theory(tmp_path):
     assert measure.passed, measure
     (profile,) = run.profiles
     assert len(profile.computed[0]) == len(profile.reference[0]) == 400
+
+
+def test_theory_of_an_irrotational_wave_is_linear_theory_for_a_low_one_and_ends_where_a_high_one_breaks():
+    case = cases.Sloshing(amplitude=1e-3, length=2.85)
+    time, level = irrotational_level(2.85, 1e-3, case.frequency, 0.0, case.gauge, 20.0)
+    linear = case.linear_level(time, case.gauge)
+    assert len(time) == 2000 and np.abs(level - linear).max() < 0.03 * np.abs(linear).max()
+    time, _ = irrotational_level(2.85, 0.5, case.frequency, 0.0, case.gauge, 20.0)
+    assert 0 < len(time) < 1000
+
+
+def test_a_tank_that_sways_as_in_the_experiment_has_the_level_of_an_irrotational_wave(tmp_path):
+    """Linear theory is 30 % too low by then, and so is the experiment."""
+    case = cases.Sloshing(resolution=16)
+    run = case.run(tmp_path / "run", until=12.0, progress=False)
+    error, crest = run.measures
+    assert error.passed and error.value > 0.005, error
+    assert crest.value > 1.25 * case.linear_level(np.array([10.4]), case.gauge)[0]
+    assert all(len(profile.reference[0]) > 100 for profile in run.profiles) and len(run.profiles) == 2
 
 
 def test_air_has_no_values(tmp_path, recwarn):
