@@ -3,14 +3,17 @@
 //! The pressure acts through Σ_s Σ_f V_s V_f (p_s + p_f) ∇_s W_sf over solid s and fluid f, p being what the velocity of the step had the
 //! gradient of (the scheme's acting pressure), and the viscous stress through the compact Laplacian of the same pairs. Both
 //! are antisymmetric, so the solid's own pairs cancel and only fluid neighbours count. Their sum is the momentum that the fluid gives.
+//! Beside a free surface all that the step's terms give to the fluid counts with the pressure, and what solids hold that comes too near.
 //! The viscous pairs feel the slope of the velocity over the width of a kernel. Where
 //! the velocity's slope at the surface is known, the viscous part is its shear over the area of the surface, and the pressure part the rest.
 
 use crate::base::parallel;
 use crate::base::{ExactSum, Matrix, Vector};
 use crate::boundary::{Walls, surface_area};
+use crate::discretisation::Stencil;
 use crate::frame::Frame;
 use crate::motion::Motion;
+use crate::neighbours::Entry;
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 
@@ -80,20 +83,20 @@ impl<const D: usize> Load<D> {
     }
 }
 
-/// The loads on every body, at the positions of `frame`, where `pressure` acts on the particles.
+/// The loads on every body, at the positions of `frame`, where `pressure` is the force on a solid without the viscous one.
 pub fn loads<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
     frame: &Frame<D>,
     walls: &Walls<D>,
     motion: &Motion<D>,
-    pressure: impl Fn(usize) -> f64 + Sync,
+    pressure: impl Fn(usize) -> Vector<D> + Sync,
 ) -> Vec<Load<D>> {
     let centers: Vec<_> = (0..settings.bodies.len()).map(|body| motion.center(body, &settings.bodies)).collect();
     let add = |sums: &mut Vec<Sums>, s: usize| {
         if particles.kind[s] == ParticleKind::Solid {
             sums.resize_with(centers.len(), Sums::default);
-            let (pressure, viscous) = force_on(settings, particles, frame, walls, &pressure, s);
+            let (pressure, viscous) = force_on(settings, particles, frame, walls, pressure(s), s);
             let body = particles.body[s] as usize;
             let arm = motion.arm(body, particles.position[s] - centers[body]);
             let (normal, velocity) = (&particles.normal[s], &particles.velocity[s]);
@@ -110,29 +113,42 @@ pub fn loads<const D: usize>(
     sums.iter().map(Load::of).collect()
 }
 
+/// Σ V_s V_f (dW/dr)/r `pair`(f, r_sf) over the fluid around solid particle `s`, whose row has V_f (dW/dr)/r.
+pub fn pairs<const D: usize>(stencil: &Stencil<D>, s: usize, pair: impl Fn(usize, Vector<D>) -> Vector<D>) -> Vector<D> {
+    let (row, lane) = stencil.neighbours.row(s);
+    let of = |entry: &Entry| {
+        let f = entry.j();
+        pair(f, stencil.position[s] - stencil.position[f]) * entry.slope(lane)
+    };
+    row.flowing().iter().map(of).sum::<Vector<D>>() * stencil.volume[s]
+}
+
+/// The force on solid particle `s` of a pressure that acts so.
+pub fn force_of_pressure<const D: usize>(stencil: &Stencil<D>, acting: impl Fn(usize) -> f64, s: usize) -> Vector<D> {
+    pairs(stencil, s, |f, r_sf| -r_sf * (acting(s) + acting(f)))
+}
+
 /// Pressure and viscous force on solid particle `s`.
 fn force_on<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
     frame: &Frame<D>,
     walls: &Walls<D>,
-    acting: &impl Fn(usize) -> f64,
+    mut pressure: Vector<D>,
     s: usize,
 ) -> (Vector<D>, Vector<D>) {
     let stencil = &frame.stencil;
     let viscosity = settings.density * settings.kinematic_viscosity;
-    let (mut pressure, mut viscous) = (Vector::zeros(), Vector::zeros());
+    let mut viscous = Vector::zeros();
     let (row, lane) = stencil.neighbours.row(s);
     for entry in row.flowing() {
         let f = entry.j();
         let slope = entry.slope(lane);
-        let r_sf = stencil.position[s] - stencil.position[f];
-        pressure -= r_sf * (slope * (acting(s) + acting(f)));
         let dispersion = |i: usize| walls.dispersion.get(i).copied().unwrap_or_else(Vector::zeros);
         let relative = (particles.velocity[f] - dispersion(f)) - (walls.seen_by(particles, s, f) - dispersion(s));
         viscous += relative * (-slope * 2.0 * viscosity);
     }
-    (pressure, viscous) = (pressure * stencil.volume[s], viscous * stencil.volume[s]);
+    viscous *= stencil.volume[s];
     if let Some(&Some(slope)) = walls.slope.get(s) {
         let normal = &particles.normal[s];
         // Without divergence the normal velocity has no slope at a wall; that of the fit is no stress.

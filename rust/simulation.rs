@@ -195,8 +195,8 @@ impl<const D: usize> Simulation<D> {
             self.prepared = false;
             return Err(error);
         }
-        let acting = |i: usize| scheme.acting_pressure(step, &flow.particles, i);
-        let loads = loads(step.settings, &flow.particles, &flow.frame, &flow.walls, &flow.motion, acting);
+        let pressure = |s: usize| scheme.pressure_force(step, flow, s);
+        let loads = loads(step.settings, &flow.particles, &flow.frame, &flow.walls, &flow.motion, pressure);
         let dissipated = dissipation(step, flow, &loads, |i| scheme.viscous_laplacian(step, i));
         let mut report = Report::new(step, &flow.particles, &flow.frame.stencil, scheme.penalty(time_step), loads);
         report.dissipation = dissipated;

@@ -3,7 +3,7 @@
 use alsph::boundary::{Walls, add_wall_flux, extend_pressure};
 use alsph::discretisation::{Divergence, Gradient};
 use alsph::forcing::BodyForce;
-use alsph::loads::loads;
+use alsph::loads::{force_of_pressure, loads};
 use alsph::motion::Motion;
 use alsph::settings::{Boundary, Settings, Solver};
 use alsph::{Clock, ParticleKind, Particles, Simulation, Vector};
@@ -95,7 +95,9 @@ fn start(side: usize, disorder: f64) -> [f64; 3] {
     let (mut set, exact) = (Set::of(particles, &settings, true), Array::new());
     let velocity = project(&settings, &mut set, Vector::from([1.0, 0.0]));
     let Set { particles, frame } = &set;
-    let load = loads(&settings, particles, frame, &Walls::new(&settings), &Motion::default(), |i| particles.pressure[i])[0]
+    let load = loads(&settings, particles, frame, &Walls::new(&settings), &Motion::default(), |s| {
+        force_of_pressure(&frame.stencil, |i| particles.pressure[i], s)
+    })[0]
         .pressure_force[0];
     let impulse = load / (PI * common::RADIUS.powi(2));
     let mut sums = [[0.0; 2]; 2];

@@ -6,6 +6,7 @@ use alsph::discretisation::{
 };
 use alsph::frame::{Frame, Travel};
 use alsph::motion::Pose;
+use alsph::report::Report;
 use alsph::settings::{Settings, Solver};
 use alsph::surface::{Place, Surface};
 use alsph::{Clock, Matrix, ParticleKind, Particles, Simulation, Vector};
@@ -358,7 +359,7 @@ fn water_in_space_has_the_same_bits_on_two_threads_and_makes_no_energy() {
 }
 
 /// Water between slip walls over a floor of solids, on it a free body that floats, half in it one that swings as it is told: the same bits with
-/// all that is stale made NaN, cut, on two threads and stored in another order. With every rule of the walls, frame and gradient, in 2-D and 3-D.
+/// all that is stale made NaN, cut, on two threads and stored in another order, and loads that are its momentum. With every rule of the walls, frame and gradient, in 2-D and 3-D.
 fn water_with_bodies<const D: usize>(
     scheme: &serde_json::Value,
     walls: &str,
@@ -463,6 +464,18 @@ fn water_with_bodies<const D: usize>(
     assert!(state(&whole) == state(&second), "{scheme} {walls} {frame} {gradient} {D}");
     assert_eq!(whole.poses(), second.poses());
     assert!(whole.poses()[1].displacement.norm() > 0.0 && whole.poses()[2].displacement.x > 0.0);
+    // What acts on the bodies is what moves the water: nothing else does upwards, but its weight. The viscous term loses some.
+    let (mass, up) = (SPACING.powi(D as i32), D - 1);
+    let water = whole.particles();
+    let flows = |i: &usize| water.kind[*i] == ParticleKind::Fluid;
+    let momentum: f64 = (0..water.real).filter(flows).map(|i| mass * water.velocity[i][up]).sum();
+    let weight = mass * (0..water.real).filter(flows).count() as f64 * whole.clock().time;
+    let given = |report: &Report<D>| -> f64 {
+        report.time_step * report.loads.iter().map(|load| load.pressure_force[up] + load.viscous_force[up]).sum::<f64>()
+    };
+    let given: f64 = whole.take_history().iter().map(given).sum();
+    let missed = momentum + given + weight;
+    assert!(missed.abs() < 0.02 * kinematic_viscosity, "{scheme} {walls} {frame} {gradient} {D}: {missed} of {weight}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Loads against exact values, torques among them, and that they do not depend on how particles are stored.
 
 use alsph::boundary::{Walls, surface_area};
-use alsph::loads::{Load, loads};
+use alsph::loads::{Load, force_of_pressure, loads};
 use alsph::motion::Motion;
 use alsph::{Clock, ParticleKind, Particles, Settings, Simulation, Vector};
 use approx::assert_relative_eq;
@@ -94,7 +94,9 @@ fn seen<const D: usize>(settings: &Settings, set: &Set<D>) -> (Vec<Vec<f64>>, Lo
     let Set { particles, frame } = set;
     let mut walls = Walls::new(settings);
     walls.see(settings, particles, frame);
-    let load = loads(settings, particles, frame, &walls, &Motion::default(), |i| particles.pressure[i])[0];
+    let load = loads(settings, particles, frame, &walls, &Motion::default(), |s| {
+        force_of_pressure(&frame.stencil, |i| particles.pressure[i], s)
+    })[0];
     walls.sharpen(settings, particles, frame, |i| particles.velocity[i] * particles.position[i][0], 1.0);
     let mut order: Vec<usize> = (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Solid).collect();
     order.sort_by_key(|&i| particles.id[i]);

@@ -61,7 +61,7 @@ fn shown<const D: usize>(
     let seen = |i: usize| walls.viscous_velocity[i].add_scalar(-WALL_VELOCITY);
     let shown: Vec<_> = solids.map(|i| (set.particles.depth[i] / spacing, seen(i))).collect();
     assert!(shown.len() > 20);
-    (shown, loads(&settings, &set.particles, &set.frame, &walls, &Motion::default(), |_| 0.0)[0])
+    (shown, loads(&settings, &set.particles, &set.frame, &walls, &Motion::default(), |_| Vector::zeros())[0])
 }
 
 /// A cubic profile goes on into the solid particles, in 2-D and 3-D, over a plane and over a cylinder. An odd mirror image would

@@ -130,6 +130,16 @@ impl<const D: usize> Images<D> {
         self.renew(field, |k, value| value.mirrored(&self.sign[k]));
     }
 
+    /// Particle `index`, or that whose image it is where there are `real` ones.
+    pub fn source(&self, real: usize, index: usize) -> usize {
+        index.checked_sub(real).map_or(index, |k| self.source[k] as usize)
+    }
+
+    /// What is `value` at particle `index` as its source has it.
+    pub fn at_source<T: Mirrored<D>>(&self, real: usize, index: usize, value: T) -> T {
+        index.checked_sub(real).map_or(value, |k| value.mirrored(&self.sign[k]))
+    }
+
     /// [`Images::fill`] of a pressure with the gradient `slope` of each particle: across a slip wall it goes on with that.
     pub fn fill_pressure(
         &self,

@@ -9,6 +9,7 @@ mod weakly_compressible;
 
 use crate::base::{Vector, exact_sums, parallel};
 use crate::flow::{Flow, Step};
+use crate::loads::force_of_pressure;
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::{DensityDiffusion, SchemeSettings, Settings, TimeStepLimits};
 
@@ -31,6 +32,11 @@ pub trait Scheme<const D: usize>: Send + Sync {
 
     /// What the velocity of the step had the gradient of.
     fn acting_pressure(&self, step: Step, particles: &Particles<D>, i: usize) -> f64;
+
+    /// The force on solid particle `s` of all but the viscous term.
+    fn pressure_force(&self, step: Step, flow: &Flow<D>, s: usize) -> Vector<D> {
+        force_of_pressure(&flow.frame.stencil, |i| self.acting_pressure(step, &flow.particles, i), s)
+    }
 
     /// ∇²u of particle `i` as the viscous term of the step had it.
     fn viscous_laplacian(&self, step: Step, i: usize) -> Vector<D>;

@@ -50,6 +50,8 @@ impl Penalty {
                 };
             },
         );
+        terms.forget_reaction(particles.real);
+        terms.react_to_tensor(flow, penalty * step.settings.density);
         terms.show_predicted(step.settings, flow);
     }
 

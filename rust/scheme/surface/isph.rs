@@ -60,6 +60,7 @@ impl<const D: usize> Solution<D> {
         self.felt.clone_from(&terms.velocity_star);
         if share > 0.0 {
             terms.correct_velocity(step, flow);
+            terms.forget_reaction(flow.particles.real);
             let velocity = &flow.particles.velocity;
             parallel::for_each(&mut self.felt, |i, u| *u = *u * (1.0 - share) + velocity[i] * share);
             mirror(step.settings, &flow.frame, &flow.particles, &mut self.felt);

@@ -23,6 +23,7 @@ use crate::boundary::{VelocityRule, conditions, extrapolate_scalar, shepard};
 use crate::discretisation::{AdjointGradient, ConservativeGradient, Divergence, LaplacianAndGradient, LaplacianAndItsSum};
 use crate::flow::{Flow, Step};
 use crate::frame::Frame;
+use crate::loads::pairs;
 use crate::particles::{ParticleKind, Particles, of_solids};
 use crate::scheme::isph::Solve;
 use crate::scheme::projection::{Sweeps, weight};
@@ -34,7 +35,7 @@ use crate::surface::{Place, Surface};
 
 use alsph::Penalty;
 use isph::Solution;
-use solids::{keep_out, mirror};
+use solids::{Held, keep_out, mirror};
 use weakly_compressible::Sound;
 
 /// The scheme that the settings name, beside a free surface.
@@ -104,6 +105,8 @@ pub struct Terms<const D: usize> {
     velocity_star: Vec<Vector<D>>,
     /// ∇²p with air beyond the surface.
     pressure_laplacian: Vec<f64>,
+    /// What all but the viscous term gives to solids.
+    reaction: Vec<Vector<D>>,
 }
 
 impl<const D: usize> Terms<D> {
@@ -121,6 +124,7 @@ impl<const D: usize> Terms<D> {
             mirrored: Vec::new(),
             velocity_star: Vec::new(),
             pressure_laplacian: Vec::new(),
+            reaction: Vec::new(),
         }
     }
 
@@ -233,6 +237,7 @@ impl<const D: usize> Terms<D> {
     fn predict_velocity(&mut self, step: Step, flow: &Flow<D>) {
         let Flow { particles, frame, before, .. } = flow;
         let condition = conditions(step.settings);
+        self.forget_reaction(particles.real);
         frame.images.blank(&mut self.velocity_star, particles.len());
         let (friction, dt) = (&self.friction, step.time_step);
         parallel::for_each(frame.images.real(&mut self.velocity_star), |i, star| {
@@ -286,9 +291,7 @@ impl<const D: usize> Terms<D> {
             }
         };
         let place = &surface.place;
-        // Antisymmetric forces draw particles together that carry a pressure below that of the air, until voids open between them (Swegle,
-        // Hicks and Attaway 1995); differences do not (Sun et al. 2018).
-        let own = |i: usize| if pressure[i] < 0.0 && place[i] == Place::Inside { -1.0 } else { 1.0 };
+        let own = |i: usize| own_share(pressure[i], place[i]);
         let real = frame.images.real(velocity);
         match self.own.pressure_gradient {
             PressureGradient::Conservative => {
@@ -299,6 +302,46 @@ impl<const D: usize> Terms<D> {
             }
         }
         frame.images.fill(velocity);
+        match self.own.pressure_gradient {
+            PressureGradient::Conservative => {
+                let Flow { particles: Particles { real, pressure, .. }, frame, surface, .. } = &*flow;
+                let own = |f: usize| own_share(pressure[f], surface.place[frame.images.source(*real, f)]);
+                self.react(flow, |s, f, r_sf| -r_sf * (pressure[s] + own(f) * pressure[f]));
+            }
+            PressureGradient::Adjoint => self.react_to_tensor(flow, -1.0),
+        }
+    }
+
+    /// Solids feel from the fluid in front of them what they give to it: `pair`(s, f, r_sf) times V_s V_f (dW/dr)/r.
+    fn react(&mut self, flow: &Flow<D>, pair: impl Fn(usize, usize, Vector<D>) -> Vector<D> + Sync) {
+        let Flow { particles, frame, .. } = flow;
+        let force = |s: usize| pairs(&frame.stencil, s, |f, r_sf| pair(s, f, r_sf));
+        let forces = of_solids(&particles.kind[..particles.real], force);
+        forces.into_iter().for_each(|(s, force)| self.reaction[s] += force);
+    }
+
+    /// The same of a `factor` times G* of what is in `tensor`, as a force on the fluid.
+    fn react_to_tensor(&mut self, flow: &Flow<D>, factor: f64) {
+        let tensor = std::mem::take(&mut self.tensor);
+        self.react(flow, |s, f, r_sf| (tensor[s].0 + tensor[f].0) * r_sf * factor);
+        self.tensor = tensor;
+    }
+
+    /// Let nothing come too near to solids, which feel that.
+    fn hold(&mut self, step: Step, flow: &mut Flow<D>) {
+        let Step { settings, time_step, .. } = step;
+        let mass = settings.density * settings.particle_spacing.powi(D as i32);
+        for Held { by, change, .. } in keep_out(settings, flow) {
+            let Flow { particles, frame, .. } = &*flow;
+            let change = frame.images.at_source(particles.real, by, change);
+            self.reaction[frame.images.source(particles.real, by)] -= change * (mass / time_step);
+        }
+    }
+
+    /// Begin anew with what acts on solids.
+    fn forget_reaction(&mut self, count: usize) {
+        self.reaction.clear();
+        self.reaction.resize(count, Vector::zeros());
     }
 
     /// Find ∇·u less θ.
@@ -339,9 +382,16 @@ impl<const D: usize> Terms<D> {
                 },
             );
             frame.images.fill(velocity);
+            self.react_to_tensor(flow, factor);
         }
         self.extend_pressure(step, flow);
     }
+}
+
+/// What the pressure of a particle counts in its own gradient. Antisymmetric forces draw particles together that carry one below that of the
+/// air, until voids open between them (Swegle, Hicks and Attaway 1995); differences do not (Sun et al. 2018).
+fn own_share(pressure: f64, place: Place) -> f64 {
+    if pressure < 0.0 && place == Place::Inside { -1.0 } else { 1.0 }
 }
 
 impl<const D: usize, P: Pressure<D>> BesideSurface<D, P> {
@@ -358,7 +408,7 @@ impl<const D: usize, P: Pressure<D>> Scheme<D> for BesideSurface<D, P> {
     fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> Solved {
         self.terms.begin(step, flow);
         let solved = self.pressure.advance(&mut self.terms, step, flow);
-        keep_out(step.settings, flow);
+        self.terms.hold(step, flow);
         self.terms.measure_divergence(step, flow);
         if !step.settings.bodies.is_empty() {
             flow.walls.see(step.settings, &flow.particles, &flow.frame); // for the loads
@@ -372,6 +422,10 @@ impl<const D: usize, P: Pressure<D>> Scheme<D> for BesideSurface<D, P> {
 
     fn acting_pressure(&self, _: Step, particles: &Particles<D>, i: usize) -> f64 {
         particles.pressure[i]
+    }
+
+    fn pressure_force(&self, _: Step, _: &Flow<D>, s: usize) -> Vector<D> {
+        self.terms.reaction[s]
     }
 
     fn viscous_laplacian(&self, _: Step, i: usize) -> Vector<D> {
