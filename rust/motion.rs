@@ -48,6 +48,11 @@ const LAGGING: f64 = 0.02;
 /// ρ c S Δt over M up to which a body that sound reaches has no need of that.
 const ACOUSTIC_SHARE: f64 = 0.5;
 
+/// Δt over √(mass/stiffness) of a spring, and over mass/damping of a damper, up to which they are followed well: Ā needs some three hundred steps
+/// a period, with fewer the fluid's answer adds energy (a tenth in three periods with sixty). They would be stable up to 2.
+const SPRING_SHARE: f64 = 0.02;
+const DAMPER_SHARE: f64 = 0.5;
+
 /// Where a rigid body is: how far its centre has come and it has turned since the start, how fast it moves, and what accelerates it. In 2-D
 /// the last component alone turns.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -433,11 +438,17 @@ impl<const D: usize> Motion<D> {
         }
     }
 
-    /// Largest Δt for free bodies in a fluid with this speed of sound.
-    pub fn acoustic_limit(&self, settings: &Settings, sound_speed: f64) -> f64 {
-        let lightness = |body: &Moving<D>| body.rigid.as_ref().map_or(0.0, |rigid| body.layer / rigid.mass);
-        let lightest = self.bodies.iter().map(lightness).fold(0.0, f64::max);
-        ACOUSTIC_SHARE * settings.particle_spacing / (sound_speed * lightest)
+    /// Largest Δt for free bodies: for their springs and dampers, and in a fluid whose speed of sound is given for how light they are.
+    pub fn response_limit(&self, settings: &Settings) -> f64 {
+        let sound = settings.sound_speed().map_or(0.0, |speed| speed / (ACOUSTIC_SHARE * settings.particle_spacing));
+        let of = |body: &Moving<D>| {
+            let Some(Rigid { mass, stiffness, damping, free, .. }) = &body.rigid else { return f64::INFINITY };
+            let largest =
+                |of: &[f64]| of.iter().zip(free).map(|(value, &free)| if free { *value } else { 0.0 }).fold(0.0, f64::max);
+            let (spring, damper) = ((mass / largest(stiffness)).sqrt(), mass / largest(damping));
+            (mass / (sound * body.layer)).min(SPRING_SHARE * spring).min(DAMPER_SHARE * damper)
+        };
+        self.bodies.iter().map(of).fold(f64::INFINITY, f64::min)
     }
 
     /// The largest acceleration of a body's surface at the start of the step.

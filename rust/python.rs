@@ -87,6 +87,9 @@ impl PySimulation {
         if let Some(poses) = state.get_item("pose")? {
             let poses = read_poses("pose", &poses)?;
             engine!(&mut engine, s => s.set_poses(&poses))?;
+        } else if clock.step > 0 && engine!(&engine, s => s.settings().bodies.iter().any(|body| body.rigid.is_some())) {
+            let problem = format!("is missing, with which free bodies go on from step {}", clock.step);
+            return Err(Error::Array { name: "pose", problem }.into());
         }
         Ok(Self { engine, raised: Raised::default() })
     }

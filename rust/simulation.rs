@@ -266,7 +266,12 @@ impl<const D: usize> Simulation<D> {
     /// Δt of the next step.
     fn time_step(&self, velocity_max: f64) -> Result<f64> {
         let settings = &self.settings;
+        let response = self.flow.motion.response_limit(settings);
         if !settings.adaptive_time_step || settings.adaptive_until.is_some_and(|end| self.clock.time >= end) {
+            if settings.time_step > response {
+                let problem = format!("{} is too long for a free body: at most {response:.3e}", settings.time_step);
+                return Err(setting("time_step", problem));
+            }
             return Ok(settings.time_step);
         }
         let limits = self.scheme.limits(settings, velocity_max);
@@ -278,9 +283,7 @@ impl<const D: usize> Simulation<D> {
             let symptom = Symptom { particle: fastest.unwrap_or(0), field: "velocity", value: velocity_max };
             return Err(self.diverged(symptom, fastest_waves, velocity_max));
         }
-        let motion = &self.flow.motion;
-        let sound = settings.sound_speed().map_or(f64::INFINITY, |speed| motion.acoustic_limit(settings, speed));
-        let bodies = settings.acceleration_limit(motion.acceleration()).min(sound);
+        let bodies = settings.acceleration_limit(self.flow.motion.acceleration()).min(response);
         Ok(settings.time_step.min(fastest_waves).min(limits.viscous).min(limits.body_force).min(bodies))
     }
 

@@ -192,6 +192,35 @@ fn a_heavy_body_keeps_its_energy_and_feels_the_body_force() {
     }
 }
 
+/// Steps follow a spring that is much stiffer than the fluid asks for, and a damper; a constant step that does not is refused. What cannot move
+/// is not asked.
+#[test]
+fn steps_are_short_enough_for_springs_and_dampers() {
+    let rigid = |[stiffness, damping]: [f64; 2], free: bool| {
+        json!({
+            "mass": 5.0, "inertia": [0.15], "force": [0.0, 0.0], "stiffness": [0.0, stiffness], "damping": [0.0, damping],
+            "free": [true, free, true], "added_mass": 0.3, "added_inertia": 0.01,
+        })
+    };
+    for (law, limit) in [([2e5, 0.0], 0.02 * (5.0 / 2e5f64).sqrt()), ([0.0, 2500.0], 0.5 * 5.0 / 2500.0)] {
+        let (mut value, particles) = body_in_fluid(rigid(law, true), &[]);
+        let mut springy = simulation(&value, &particles, None);
+        springy.set_poses(&[Pose { velocity: Vector3::y(), ..Pose::default() }]).expect("one body");
+        springy.advance_until(0.1, None).expect("stable");
+        let history = springy.take_history();
+        assert!(history.iter().all(|report| report.time_step <= limit), "{law:?}: {:?}", history[0].time_step);
+        let farthest = history.iter().map(|report| report.poses[0].displacement.y.abs()).fold(0.0, f64::max);
+        let known = if law[1] > 0.0 { 5.0 / law[1] } else { (5.0 / law[0]).sqrt() };
+        assert_relative_eq!(farthest, known, max_relative = 0.05);
+
+        let (held, _) = body_in_fluid(rigid(law, false), &[]);
+        simulation(&held, &particles, None).advance(1, None).expect("stable");
+        (value["adaptive_time_step"], value["penalty_constant"]) = (json!(false), json!(1.0));
+        let refused = simulation(&value, &particles, None).advance(1, None).expect_err("too long a step").to_string();
+        assert!(refused.contains("is too long for a free body: at most"), "{refused}");
+    }
+}
+
 /// A run that goes on from the particles and poses of another has the bits of that, normals at all angles among them.
 #[test]
 fn the_shape_is_that_of_the_particles_to_the_last_bit() {

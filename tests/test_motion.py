@@ -193,6 +193,9 @@ def test_a_run_that_begins_with_one_whose_body_has_moved_is_told_so(tmp_path):
         ({"free": (True,)}, "rigid: free = (True,): must be 2 directions and 1 axes, True or False each"),
         ({"free": (1, 1, 1)}, "rigid: free = (1, 1, 1): must be"),
         ({"free": True}, "rigid: free = True: must be"),
+        ({"free": (False, False, False)}, "rigid: free = (False, False, False): a body that cannot move at all"),
+        ({"stiffness": (0, -1)}, "rigid: stiffness = (0, -1): must not be negative"),
+        ({"damping": (-0.5, 0)}, "rigid: damping = (-0.5, 0): must not be negative"),
         ({"added_mass": -1.0}, "rigid: added_mass = -1.0: must be a number"),
     ],
 )
@@ -244,6 +247,16 @@ def test_a_restored_free_body_has_the_bits_of_a_whole_one():
     for name, values in first.items():
         order = [np.argsort(state["id"]) if name != "pose" and np.ndim(values) else ... for state in (first, second)]
         assert np.array_equal(np.asarray(values)[order[0]], np.asarray(second[name])[order[1]]), name
+
+
+def test_a_free_body_does_not_go_on_without_its_pose():
+    case = ConcentricRelease(density_ratio=0.5, resolution=8)
+    simulation = case.simulation(threads=1)
+    simulation.advance(2)
+    state = simulation.state()
+    del state["pose"]
+    with pytest.raises(ValueError, match="`pose`: is missing, with which free bodies go on from step 2"):
+        case.restored(state, threads=1)
 
 
 # Cases

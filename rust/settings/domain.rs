@@ -89,6 +89,9 @@ impl Rigid {
         if self.free.len() != dimensions + turns {
             return refuse("free", "must say of each direction and axis whether the body can move so");
         }
+        if !self.free.contains(&true) {
+            return refuse("free", "must leave it a direction or an axis; a body that cannot move is not rigid");
+        }
         for (key, value) in [("added_mass", self.added_mass), ("added_inertia", self.added_inertia)] {
             if !(value.is_finite() && value >= 0.0) {
                 return refuse(key, "must be a number not below zero");
@@ -96,6 +99,9 @@ impl Rigid {
         }
         for (key, vector) in [("force", &self.force), ("stiffness", &self.stiffness), ("damping", &self.damping)] {
             validate_vector(&format!("bodies.{name}.rigid.{key}"), vector, dimensions)?;
+            if key != "force" && vector.iter().any(|&value| value < 0.0) {
+                return refuse(key, "must not be negative");
+            }
         }
         Ok(())
     }

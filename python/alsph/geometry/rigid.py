@@ -82,6 +82,11 @@ class Rigid:
         if len(free) != dimensions + turns or not all(isinstance(each, bool | np.bool_) for each in free):
             told = f"must be {dimensions} directions and {turns} axes, True or False each"
             raise ConfigError(f"rigid: free = {shown(self.free)}: {told}")
+        if not any(free):
+            raise ConfigError(f"rigid: free = {shown(self.free)}: a body that cannot move at all needs no `rigid`")
+        for name in ("stiffness", "damping"):
+            if min(vectors[name]) < 0:
+                raise ConfigError(f"rigid: {name} = {shown(getattr(self, name))}: must not be negative")
         own = {name: self._number(name, least) for name, least in (("mass", 0.0), ("displaced", 0.0))}
         length = (own["displaced"] / np.pi) ** 0.5 if dimensions == 2 else (own["displaced"] * 0.75 / np.pi) ** (1 / 3)
         mass = ADDED_MASS * own["displaced"] if self.added_mass is None else self._number("added_mass", -1.0)
