@@ -180,8 +180,9 @@ impl<const D: usize> Simulation<D> {
         motion.accelerations(particles.real, &mut body_force.walls);
         let middle = self.clock.time + 0.5 * time_step;
         let prescribed = self.forcing.apply(step.settings, particles, frame, body_force, middle);
+        let apart = motion.check_contact(step.settings, particles, &frame.stencil, self.clock.time);
         flow.remember();
-        if let Err(error) = prescribed {
+        if let Err(error) = prescribed.and(apart) {
             flow.restore();
             self.prepared = false;
             return Err(error);

@@ -318,6 +318,49 @@ fn a_body_on_an_axle_keeps_turning() {
     assert_relative_eq!(pose.angle, spin * simulation.clock().time, epsilon = 1e-3);
 }
 
+/// Contact is not computed: a free body that comes into another ends the run. So does one that a slip wall cuts, if it moves across that.
+/// The state is that of the step before.
+#[test]
+fn a_body_that_meets_another_or_leaves_the_wall_that_cuts_it_ends_the_run() {
+    let rigid = json!({
+        "mass": 50.0, "inertia": [1.0], "force": [0.0, 0.0], "stiffness": [0.0, 0.0], "damping": [0.0, 0.0],
+        "free": [true, true, true], "added_mass": 0.1, "added_inertia": 1e-3,
+    });
+    let (mut value, mut particles) = body_in_fluid(rigid, &[]);
+    let fixed = json!({"name": "block", "velocity": [0.0, 0.0], "moves": false, "center": [0.0, 0.0]});
+    value["bodies"].as_array_mut().expect("bodies").push(fixed);
+    for i in 0..particles.real {
+        let deep = particles.position[i][0] - 0.875;
+        if particles.kind[i] == ParticleKind::Fluid && deep > 0.0 {
+            (particles.kind[i], particles.body[i]) = (ParticleKind::Solid, 1);
+            let out = if deep < 0.0625 { -1.0 } else { 1.0 };
+            (particles.normal[i], particles.depth[i]) = (Vector::from([out, 0.0]), deep.min(0.125 - deep));
+        }
+    }
+    let mut rolling = simulation(&value, &particles, None);
+    rolling.set_poses(&[Pose { velocity: Vector3::x() * 2.0, ..Pose::default() }, Pose::default()]).expect("two bodies");
+    let error = rolling.advance_until(1.0, None).expect_err("they meet").to_string();
+    assert!(error.contains("`body` has come into `block`"), "{error}");
+    let came = rolling.poses()[0].displacement.x;
+    assert!((0.125..0.15).contains(&came), "{came}");
+    let (of, clock) = (solids(rolling.particles()), rolling.clock());
+    assert!(rolling.advance(1, None).is_err() && solids(rolling.particles()) == of && rolling.clock().time == clock.time);
+
+    let (mut half, particles) = body_in_fluid(Value::Null, &[]);
+    half["domain"]["boundaries"] = json!([["slip", "slip"], ["slip", "slip"]]);
+    let away = |time: f64| Pose { displacement: Vector3::y() * time, velocity: Vector3::y(), ..Pose::default() };
+    half["domain"]["lower"] = json!([0.0, 0.5]);
+    let upper: Vec<_> = (0..particles.real).filter(|&i| particles.position[i][1] > 0.5).map(|i| i as u32).collect();
+    let mut particles = particles;
+    particles.reorder(&upper);
+    particles.real = upper.len();
+    let error = simulation(&half, &particles, told(away)).advance_until(1.0, None).expect_err("it is cut").to_string();
+    assert!(error.contains("`body`, which a slip wall cuts, moves across it, along axis 1"), "{error}");
+    let along =
+        told(|time| Pose { displacement: Vector3::x() * (0.1 * time), velocity: Vector3::x() * 0.1, ..Pose::default() });
+    simulation(&half, &particles, along).advance_until(0.2, None).expect("it may move along");
+}
+
 /// What cannot be is refused, and says what.
 #[test]
 fn motions_that_cannot_be_are_refused() {

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from alsph import reference
+from alsph.analysis import sampling
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
@@ -20,6 +21,13 @@ MORISON = {"drag coefficient of Morison": 2.03, "inertia coefficient of Morison"
 HARMONICS = np.array([1, 3, 5])
 """Of which the largest force is taken: those that a flow has which is the same, mirrored, half a period later."""
 
+PHASES = (180, 210, 330)
+"""Phases 360 t/T [degrees] at which the velocity beside the cylinder was measured."""
+
+BESIDE = 0.01
+"""How far [T] a snapshot may be from such a phase: what the measured profiles differ by in so much is less than 0.06 U."""
+
+EXPERIMENT = "experiment (Dütsch et al. 1998)"
 SOURCE = "vorticity and stream function on a log-polar grid to 40 D, extrapolated"
 
 
@@ -27,7 +35,8 @@ class OscillatingCylinder(MovingCylinder):
     """A cylinder that oscillates along x in a fluid at rest: x = -A sin(2πt/T); U is its largest speed 2πA/T.
 
     At Re = 100 and KC = UT/D = 5 the flow is periodic and symmetric (Dütsch et al., J. Fluid Mech. 360, 1998, 249),
-    and the force is known. Drag and inertia coefficients are those of Morison's formula, F = -c_d ρDV|V|/2 -
+    and the force is known; so are velocities at 180, 210 and 330 degrees, for which a run needs snapshots every twelfth
+    of a period (--output-interval 0.416667). Drag and inertia coefficients are those of Morison's formula, F = -c_d ρDV|V|/2 -
     c_m ρπD²/4 dV/dt with the velocity V of the cylinder, fitted to the last whole period.
     """
 
@@ -37,6 +46,7 @@ class OscillatingCylinder(MovingCylinder):
         "largest force coefficient",
         *MORISON,
         "force coefficient over the last period",
+        "velocity at ",
     )
 
     keulegan_carpenter: float = Field(default=5.0, gt=0, description="Keulegan-Carpenter number KC = UT/D [-]")
@@ -88,7 +98,36 @@ class OscillatingCylinder(MovingCylinder):
                 Measure(name, float(value), expected if known else math.nan, 0.05, SOURCE)
                 for (name, expected), value in zip(MORISON.items(), fitted, strict=True)
             ),
+            *(
+                Measure(
+                    f"velocity at {phase} degrees, rms difference, U",
+                    float(np.sqrt(np.nanmean((computed - measured) ** 2))),
+                    0.0,
+                    0.1,
+                    EXPERIMENT,
+                )
+                for phase, (_, computed, measured) in self._velocities(run).items()
+            ),
         ]
+
+    def _velocities(self, run: Record) -> dict[int, tuple[FloatArray, FloatArray, FloatArray]]:
+        """Return places (x, y, component) (3, n), velocity [U] (n,) and that of the experiment (n,), by phase.
+
+        Of the last period, at the phases that there are snapshots of. Points in the cylinder have NaN.
+        """
+        last = math.floor(run.times[-1] / self.period + BESIDE) if self.is_known and len(run.times) else 0
+        phase, x, component, y, measured = reference.table("oscillating_cylinder_profiles.csv")
+        found = {}
+        for each in PHASES if last else ():
+            snapshot = run.snapshot((last - 1 + each / 360) * self.period)
+            if abs(snapshot.time / self.period - (last - 1 + each / 360)) > BESIDE:
+                continue
+            here = phase == each
+            points, axis = np.stack([x, y], axis=1)[here], component[here].astype(int)
+            velocity = sampling.at(snapshot, points, run.spacing, self.domain())["velocity"]
+            velocity[sampling.in_solid(snapshot.position, snapshot.fluid, points)] = np.nan
+            found[each] = np.stack([x, y, component])[:, here], velocity[np.arange(len(axis)), axis], measured[here]
+        return found
 
     def profiles(self, run: Record) -> list[Profile]:
         """Return the force coefficient over the last whole period."""
@@ -100,7 +139,16 @@ class OscillatingCylinder(MovingCylinder):
             share, force, *_ = reference.table("oscillating_cylinder_force.csv")
             known, source = (share, force), SOURCE
         axes = ("$t/T$", "$C_x$")
-        return [Profile("force coefficient over the last period", axes, last[:2], known, source)]
+        drawn = [Profile("force coefficient over the last period", axes, last[:2], known, source)]
+        for phase, ((x, y, component), computed, measured) in self._velocities(run).items():
+            for station in np.unique(x):
+                for k, name in enumerate("uv"):
+                    here = np.flatnonzero((x == station) & (component == k))
+                    here = here[np.argsort(y[here])]
+                    title = f"velocity at {phase} degrees, {name} at x = {station:g} D"
+                    labels = ("$y/D$", f"${name}/U$")
+                    drawn.append(Profile(title, labels, (y[here], computed[here]), (y[here], measured[here]), EXPERIMENT))
+        return drawn
 
     @property
     def is_known(self) -> bool:

@@ -25,11 +25,17 @@
 //!
 //! Likewise rotation. Where c is given, as in weakly compressible schemes, M A^{n+1} = F^n does with ρ c S Δt < M/2.
 
+mod contact;
+mod pose;
+
+pub use pose::{Following, NUMBERS, Pose};
+
 use crate::base::Vector;
 use crate::base::error::{Error, Result, setting};
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::{Body, Boundary, Rigid, Settings};
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Rotation3, Vector3};
+use pose::FOLLOWING;
 
 /// Coordinates in a body's own axes are multiples of this part of Δx, normals of this number.
 const GRAIN: f64 = 1.0 / (1u64 << 30) as f64;
@@ -40,11 +46,6 @@ const LAYER: f64 = 0.75;
 /// How far [Δx] from where its velocity takes it a body may be that a rule moves.
 const JUMP: f64 = 0.5;
 
-/// How much of the way to A the slow Ā goes in a step, and how much of the way to what it is behind by the lag does: slowly, so that it does not
-/// ring with the waves between a light body and its vessel.
-const FOLLOWING: f64 = 0.1;
-const LAGGING: f64 = 0.02;
-
 /// ρ c S Δt over M up to which a body that sound reaches has no need of that.
 const ACOUSTIC_SHARE: f64 = 0.5;
 
@@ -52,76 +53,6 @@ const ACOUSTIC_SHARE: f64 = 0.5;
 /// a period, with fewer the fluid's answer adds energy (a tenth in three periods with sixty). They would be stable up to 2.
 const SPRING_SHARE: f64 = 0.02;
 const DAMPER_SHARE: f64 = 0.5;
-
-/// Where a rigid body is: how far its centre has come and it has turned since the start, how fast it moves, and what accelerates it. In 2-D
-/// the last component alone turns.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Pose {
-    pub displacement: Vector3<f64>,
-    /// Rotation vector.
-    pub angle: Vector3<f64>,
-    pub velocity: Vector3<f64>,
-    pub spin: Vector3<f64>,
-    pub acceleration: Vector3<f64>,
-    pub angular_acceleration: Vector3<f64>,
-    /// What follows the two slowly, of a free body, and how far it is behind.
-    pub mean_acceleration: Vector3<f64>,
-    pub mean_angular_acceleration: Vector3<f64>,
-    pub lag: Vector3<f64>,
-    pub angular_lag: Vector3<f64>,
-}
-
-/// The numbers of a pose.
-pub const NUMBERS: usize = 30;
-
-impl Pose {
-    /// From its numbers, in the order of its fields.
-    pub fn from_numbers(numbers: [f64; NUMBERS]) -> Self {
-        let three = |k: usize| Vector3::from_column_slice(&numbers[3 * k..3 * k + 3]);
-        Self {
-            displacement: three(0),
-            angle: three(1),
-            velocity: three(2),
-            spin: three(3),
-            acceleration: three(4),
-            angular_acceleration: three(5),
-            mean_acceleration: three(6),
-            mean_angular_acceleration: three(7),
-            lag: three(8),
-            angular_lag: three(9),
-        }
-    }
-
-    pub fn numbers(&self) -> [f64; NUMBERS] {
-        let all = [
-            self.displacement,
-            self.angle,
-            self.velocity,
-            self.spin,
-            self.acceleration,
-            self.angular_acceleration,
-            self.mean_acceleration,
-            self.mean_angular_acceleration,
-            self.lag,
-            self.angular_lag,
-        ];
-        std::array::from_fn(|k| all[k / 3][k % 3])
-    }
-
-    /// After `time` with the same acceleration.
-    fn after<const D: usize>(&self, time: f64) -> Self {
-        let (velocity, spin) = (self.velocity + self.acceleration * time, self.spin + self.angular_acceleration * time);
-        let turned = (self.spin + spin) * (0.5 * time);
-        // About one axis angles add up, and go on beyond a turn.
-        let angle = if D == 2 {
-            self.angle + turned
-        } else {
-            (Rotation3::from_scaled_axis(turned) * Rotation3::from_scaled_axis(self.angle)).scaled_axis()
-        };
-        let displacement = self.displacement + (self.velocity + velocity) * (0.5 * time);
-        Self { displacement, angle, velocity, spin, ..*self }
-    }
-}
 
 /// The poses of all bodies that a rule moves, in their order, at a time.
 pub type MotionRule = Box<dyn FnMut(f64) -> Result<Vec<Pose>> + Send + Sync>;
@@ -161,6 +92,8 @@ struct Moving<const D: usize> {
     end: Pose,
     /// How far its particles are from its centre.
     radius: f64,
+    /// Whether a slip wall across each axis cuts it.
+    is_cut: [bool; D],
     /// The body force of the step, if it is free.
     body_force: Vector3<f64>,
     /// The fluid's mass in the layer Δx over its surface, and the moment of inertia of that for what pushes it as the body turns.
@@ -201,6 +134,7 @@ impl<const D: usize> Motion<D> {
                     frame: Pose::default(),
                     end: Pose::default(),
                     radius: 0.0,
+                    is_cut: [false; D],
                     body_force: Vector3::zeros(),
                     layer: 0.0,
                     layer_inertia: 0.0,
@@ -250,7 +184,8 @@ impl<const D: usize> Motion<D> {
         let grain = GRAIN * settings.particle_spacing;
         for i in (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Solid) {
             let Some(body) = self.place_of[particles.body[i] as usize] else { continue };
-            let Moving { center, start, radius, .. } = &mut self.bodies[body];
+            let Moving { center, start, radius, is_cut, .. } = &mut self.bodies[body];
+            contact::note_cuts(settings, &particles.position[i], particles.depth[i], is_cut);
             let arm = particles.position[i] - (*center + Vector::from_fn(|k, _| start.displacement[k]));
             let arm = arm - self.period.zip_map(&arm, whole_periods);
             let back = |v: &Vector<D>, grain: f64| turned(&-start.angle, v).map(|x| (x / grain).round() * grain);
@@ -458,54 +393,6 @@ impl<const D: usize> Motion<D> {
             acceleration.norm() + (angular_acceleration.norm() + spin.norm_squared()) * body.radius
         };
         self.bodies.iter().map(of).fold(0.0, f64::max)
-    }
-}
-
-impl Pose {
-    /// Accelerate a free body as force and torque, and its own, ask for. The fluid answers at once with a mass and a moment of inertia. Springs
-    /// and dampers act as they will after the time `ahead`, in the middle of the step: with those of its start, energy would be made.
-    fn respond<const D: usize>(
-        &mut self,
-        rigid: &Rigid,
-        [added_mass, added_inertia]: [f64; 2],
-        [force, torque]: [Vector3<f64>; 2],
-        ahead: f64,
-    ) {
-        let Rigid { mass, inertia, force: own, stiffness, damping, free, .. } = rigid;
-        let of = |values: &[f64]| Vector3::from_fn(|k, _| values.get(k).copied().unwrap_or(0.0));
-        let spring = of(stiffness).component_mul(&(self.displacement + self.velocity * ahead));
-        let damper = of(damping).component_mul(&(self.velocity + self.acceleration * ahead));
-        let total = force + of(own) - spring - damper;
-        let moves = |k: usize| k < D && free[k];
-        let acceleration = (total + (self.mean_acceleration + self.lag) * added_mass) / (mass + added_mass);
-        self.acceleration = Vector3::from_fn(|k, _| if moves(k) { acceleration[k] } else { 0.0 });
-        let turn = Rotation3::from_scaled_axis(self.angle);
-        let own_axes = match inertia[..] {
-            [only] => Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, only)),
-            _ => Matrix3::from_row_slice(inertia),
-        };
-        let inertia = turn * own_axes * turn.inverse();
-        let gyroscopic = if D == 2 { Vector3::zeros() } else { self.spin.cross(&(inertia * self.spin)) };
-        let mut twist = torque - gyroscopic + (self.mean_angular_acceleration + self.angular_lag) * added_inertia;
-        let mut inertia = inertia + Matrix3::identity() * added_inertia;
-        // About the other axes what holds the body answers any torque.
-        for k in (0..3).filter(|&k| if D == 2 { k < 2 || !free[2] } else { !free[3 + k] }) {
-            inertia.row_mut(k).fill(0.0);
-            (inertia[(k, k)], twist[k]) = (1.0, 0.0);
-        }
-        self.angular_acceleration = inertia.try_inverse().map_or_else(Vector3::zeros, |inverse| inverse * twist);
-    }
-
-    /// Let the means follow by a share, all of it without a lag. What they are behind by in the mean is added, so that they are right where
-    /// accelerations change evenly.
-    fn follow(&mut self, share: f64) {
-        let follow = |mean: &mut Vector3<f64>, lag: &mut Vector3<f64>, now: Vector3<f64>| {
-            let behind = now - *mean;
-            *lag = if share < 1.0 { *lag + (behind - *lag) * LAGGING } else { Vector3::zeros() };
-            *mean += behind * share;
-        };
-        follow(&mut self.mean_acceleration, &mut self.lag, self.acceleration);
-        follow(&mut self.mean_angular_acceleration, &mut self.angular_lag, self.angular_acceleration);
     }
 }
 
