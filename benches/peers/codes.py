@@ -33,8 +33,8 @@ def environment(name: str, folder: Path) -> str:
     return str(python)
 
 
-def measure(name: str, arguments: list[str], folder: Path) -> dict[str, Any] | None:
-    """Run one code once; return what its driver prints, or None, with a message, if it fails."""
+def measure(name: str, arguments: list[str], folder: Path, driver: str | None = None) -> dict[str, Any] | None:
+    """Run one code once; return what a driver, by default its own, prints, or None, with a message, if it fails."""
     try:
         python = environment(name, folder)
     except (OSError, subprocess.CalledProcessError) as error:
@@ -42,7 +42,7 @@ def measure(name: str, arguments: list[str], folder: Path) -> dict[str, Any] | N
         return None
     # One thread each; the drivers of this folder must not shadow installed packages.
     limits = {"OMP_NUM_THREADS": "1", "JAX_PLATFORMS": "cpu", "PYTHONSAFEPATH": "1"}
-    command = [python, str(HERE / CODES[name][2]), *arguments]
+    command = [python, str(HERE / (driver or CODES[name][2])), *arguments]
     with tempfile.TemporaryDirectory(dir=folder) as output:
         done = subprocess.run(command, cwd=output, env=os.environ | limits, capture_output=True, text=True)
     if done.returncode:

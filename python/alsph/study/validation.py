@@ -118,6 +118,8 @@ FULL = (
     Entry("standing_wave", (20, 40), until=10.0, parameters={"reynolds": 50}),
     Entry("standing_wave", (20, 40), until=10.0),
     Entry("standing_wave", (20, 40, 80), until=10.0, parameters={"reynolds": 2500}),
+    Entry("sloshing", (20, 40), until=10.0),
+    Entry("sloshing", (20, 40), until=30.0, parameters={"length": 2.85, "amplitude": 0.003, "frequency": 0.75}),
     Entry("elliptical_drop", (10, 20, 40), until=0.8),
     Entry("rotating_patch", (20, 40), until=2.0),
     Entry("cavity", (25, 50, 100), until=24.0, parameters={"reynolds": 100}, continued=12.0),
