@@ -11,13 +11,18 @@ from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
 from alsph.cases.free_surface import FreeSurface
+from alsph.cases.heave import SOURCE, linear_heave
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, inside, lattice
 from alsph.geometry.particles import join
 from alsph.geometry.rigid import Rigid
 from alsph.geometry.solids import body_layers
+
+ELEMENT = 0.02
+"""Length of a boundary element [H]: half of it changes the motion by 0.003 of a lift."""
 
 SHOWN = 2.0
 """Time from which on the force on the box is compared with its weight [√(H/g)]."""
@@ -35,6 +40,7 @@ class FloatingBox(FreeSurface):
     later_names: ClassVar[tuple[str, ...]] = (
         "mean force of the water over the weight",
         "turn of the box, rad",
+        "largest difference over the lift",
         "heave",
     )
 
@@ -103,6 +109,15 @@ class FloatingBox(FreeSurface):
         rigid = Rigid(self.weight, inertia, displaced=self.weight)
         return [SolidBody("box", (0, self.bottom + self.size[1] / 2), rigid=rigid)]
 
+    def linear_heave(self, until: float) -> tuple[FloatArray, FloatArray]:
+        """Return times [√(H/g)] and how far the box has come [H], of linear theory; it is in the middle of its tank."""
+        beam, draught = self.size[0] / 2, self.draught
+        bottom = np.linspace(0, beam, 1 + max(1, round(beam / ELEMENT))) - 1j * draught
+        side = beam - 1j * np.linspace(draught, 0, 1 + max(1, round(draught / ELEMENT)))
+        section = tuple(np.concatenate([bottom, side[1:]]).tolist())
+        time, height = linear_heave(until, section, self.weight, 1.0, self.tank_length)
+        return time, self._whole(self.lift) * (height - 1)
+
     @property
     def initial_volume(self) -> float:
         """That of the water [H²]."""
@@ -139,6 +154,10 @@ class FloatingBox(FreeSurface):
                 ),
                 Measure("turn of the box, rad", turn, 0.0, 0.02, "symmetry"),
             ]
+        if self._whole(self.lift) and len(time) and time[-1] > SHOWN:
+            exact = np.interp(time, *self.linear_heave(time[-1]))
+            worst = np.abs(run.history["box_displacement_y"] - exact).max() / abs(self._whole(self.lift))
+            rows.append(Measure("largest difference over the lift", float(worst), 0.0, 0.15, SOURCE))
         return rows + self.energy_measures(run)
 
     def energy_measures(self, run: Record) -> list[Measure]:
@@ -149,6 +168,8 @@ class FloatingBox(FreeSurface):
         """Return how far the box has risen over time."""
         if "box_displacement_y" not in run.history:
             return []
-        none = np.empty(0), np.empty(0)
+        time, known, source = run.history["time"], (np.empty(0), np.empty(0)), ""
+        if self._whole(self.lift) and len(time) and time[-1] > 0:
+            known, source = self.linear_heave(time[-1]), SOURCE
         axes = ("$t\\sqrt{g/H}$", "height of the box over that at the start, $/H$")
-        return [Profile("heave", axes, (run.history["time"], run.history["box_displacement_y"]), none, "")]
+        return [Profile("heave", axes, (time, run.history["box_displacement_y"]), known, source)]

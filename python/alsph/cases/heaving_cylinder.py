@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -15,6 +15,7 @@ from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.free_surface import FreeSurface
+from alsph.cases.heave import SOURCE, linear_heave
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, lattice
@@ -24,78 +25,17 @@ from alsph.geometry.rigid import Rigid
 from alsph.geometry.solids import Solid, body_layers
 from alsph.symbols import Symbols
 
-SOURCE = "linear theory (boundary elements)"
-
 MASS = math.pi / 2
 """Of the cylinder, half as dense as water [ρR²]."""
 
-PANEL = 0.1
-"""Length of a boundary element [R]: halving it changes the motion by 1e-4."""
+ELEMENTS = 32
+"""Boundary elements along a quarter of its circle: twice as many change the motion by 1e-4."""
+
+SECTION = tuple((-1j * np.exp(1j * np.linspace(0, math.pi / 2, ELEMENTS + 1))).tolist())
+"""Ends of these [R]."""
 
 FIRST, SECOND = 4.0, 8.0
 """Times after the first trough, and after the second crest [√(R/g)]."""
-
-STEP = 0.05
-"""Time step that linear theory is told at [√(R/g)]."""
-
-
-@cache
-def linear_heave(until: float, depth: float, tank_length: float) -> tuple[FloatArray, FloatArray]:
-    """Return the motion of the cylinder in a potential flow that disturbs the surface but little.
-
-    Green's identity on constant elements along the half immersed cylinder, the level surface and the end of the tank,
-    with images in the middle and beyond the floor, turns ∂η/∂t = ∂φ/∂y, ∂φ/∂t = −gη and Newton's law into ordinary
-    differential equations, which are solved exactly. In a deep and long tank it is the motion of Maskell and Ursell
-    (Journal of Fluid Mechanics 44 (1970) 303).
-
-    Parameters
-    ----------
-    until : float
-        Time to follow it to [√(R/g)].
-    depth, tank_length : float
-        Depth of the water and length of the tank [R].
-
-    Returns
-    -------
-    time, height : array of shape (n,)
-        Times since it was let go [√(R/g)]; the height over its draught, over that at first.
-    """
-    from scipy.linalg import expm  # half a second that most commands do without
-
-    half = tank_length / 2
-    cylinder = -1j * np.exp(1j * np.linspace(0, math.pi / 2, 1 + 2 * round(math.pi / 2 / PANEL)))
-    surface = np.linspace(1, half, 1 + round((half - 1) / PANEL)) + 0j
-    wall = half - 1j * np.linspace(0, depth, 1 + round(depth / PANEL))
-    lines = cylinder, surface, wall
-    ends = np.stack([np.concatenate([line[:-1] for line in lines]), np.concatenate([line[1:] for line in lines])])
-    size = np.abs(ends[1] - ends[0])
-    source = dipole = np.zeros((len(size), len(size)))
-    for image, way_round in ((ends, 1), (-ends.conj(), -1), (ends.conj() - 2j * depth, -1), (-ends - 2j * depth, 1)):
-        u, v = ((ends.mean(axis=0)[:, None] - end) / ((image[1] - image[0]) / size) for end in (image[1], image[0]))
-        source = source + (u * np.log(u) - u - v * np.log(v) + v).real
-        dipole = dipole + way_round * np.angle(u / v)
-    np.fill_diagonal(dipole, 0.0)
-    np.fill_diagonal(dipole, -dipole.sum(axis=1))
-    place = np.repeat(np.arange(3), [len(line) - 1 for line in lines])
-    below, level = place == 0, place == 1
-    # The length of the cylinder's elements along x, or the velocity through them at unit speed.
-    across = (ends[1] - ends[0])[below].real
-    known = np.column_stack([-dipole[:, level], source[:, below] @ (across / size[below])])
-    found = np.linalg.solve(np.where(level, -source, dipole), known)
-    force, rise = 2 * across @ found[below], found[level]
-    inertia, count = MASS + force[-1], int(level.sum())
-    # η, φ at the surface; height and velocity of the cylinder.
-    system = np.zeros((2 * count + 2,) * 2)
-    system[:count, count:-2], system[:count, -1] = rise[:, :-1], rise[:, -1]
-    system[count:-2, :count] = -np.eye(count)
-    system[-2, -1] = 1
-    system[-1, :count], system[-1, -2] = force[:-1] / inertia, -2 / inertia
-    propagator = expm(STEP * system)
-    state, heights = np.eye(2 * count + 2)[-2], []
-    for _ in range(math.ceil(until / STEP) + 1):
-        heights.append(state[-2])
-        state = propagator @ state
-    return STEP * np.arange(len(heights), dtype=float), np.array(heights)
 
 
 class HeavingCylinder(FreeSurface):
@@ -181,6 +121,10 @@ class HeavingCylinder(FreeSurface):
         position = pack(cells, cylinder, solid.position, spacing)
         return join(self.fluid(position, np.zeros_like(position), -position[:, 1]), solid.particles())
 
+    def linear_heave(self, until: float) -> tuple[FloatArray, FloatArray]:
+        """Return times [√(R/g)] and heights over the draught over the lift, of linear theory."""
+        return linear_heave(until, SECTION, MASS, self.depth, self.tank_length)
+
     def _heave(self, run: Record) -> tuple[FloatArray, FloatArray]:
         """Return times, and heights over the draught over the lift."""
         if "cylinder_displacement_y" not in run.history:
@@ -192,7 +136,7 @@ class HeavingCylinder(FreeSurface):
         time, height = self._heave(run)
         if not len(time) or time[-1] < SECOND:
             return []
-        times, linear = linear_heave(time[-1], self.depth, self.tank_length)
+        times, linear = self.linear_heave(time[-1])
         difference = np.abs(height - np.interp(time, times, linear)).max()
         return [
             Measure(
@@ -212,4 +156,12 @@ class HeavingCylinder(FreeSurface):
         if not len(time) or time[-1] <= 0:
             return []
         axes = ("$t\\sqrt{g/R}$", "height of the cylinder over its draught, over the lift")
-        return [Profile("heave", axes, (time, height), linear_heave(time[-1], self.depth, self.tank_length), SOURCE)]
+        return [
+            Profile(
+                "heave",
+                axes,
+                (time, height),
+                linear_heave(time[-1], SECTION, MASS, self.depth, self.tank_length),
+                SOURCE,
+            )
+        ]

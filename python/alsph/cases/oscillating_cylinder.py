@@ -25,7 +25,7 @@ PHASES = (180, 210, 330)
 """Phases 360 t/T [degrees] at which the velocity beside the cylinder was measured."""
 
 BESIDE = 0.01
-"""How far [T] a snapshot may be from such a phase: what the measured profiles differ by in so much is less than 0.06 U."""
+"""How far [T] a snapshot may be from such a phase: the cylinder's velocity changes by at most 0.06 U in so much."""
 
 EXPERIMENT = "experiment (Dütsch et al. 1998)"
 SOURCE = "vorticity and stream function on a log-polar grid to 40 D, extrapolated"
@@ -36,8 +36,8 @@ class OscillatingCylinder(MovingCylinder):
 
     At Re = 100 and KC = UT/D = 5 the flow is periodic and symmetric (Dütsch et al., J. Fluid Mech. 360, 1998, 249),
     and the force is known; so are velocities at 180, 210 and 330 degrees, for which a run needs snapshots every twelfth
-    of a period (--output-interval 0.416667). Drag and inertia coefficients are those of Morison's formula, F = -c_d ρDV|V|/2 -
-    c_m ρπD²/4 dV/dt with the velocity V of the cylinder, fitted to the last whole period.
+    of a period (--output-interval 0.416667). Drag and inertia coefficients are those of Morison's formula,
+    F = -c_d ρDV|V|/2 - c_m ρπD²/4 dV/dt with the velocity V of the cylinder, fitted to the last whole period.
     """
 
     name: ClassVar[str] = "oscillating_cylinder"
@@ -147,7 +147,9 @@ class OscillatingCylinder(MovingCylinder):
                     here = here[np.argsort(y[here])]
                     title = f"velocity at {phase} degrees, {name} at x = {station:g} D"
                     labels = ("$y/D$", f"${name}/U$")
-                    drawn.append(Profile(title, labels, (y[here], computed[here]), (y[here], measured[here]), EXPERIMENT))
+                    drawn.append(
+                        Profile(title, labels, (y[here], computed[here]), (y[here], measured[here]), EXPERIMENT)
+                    )
         return drawn
 
     @property
