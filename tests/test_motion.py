@@ -287,6 +287,25 @@ def test_the_work_of_a_body_that_moves_is_in_the_energy_budget(tmp_path):
     assert "inertia coefficient of Morison" in names and len(run.profiles) == 1
 
 
+def test_velocities_beside_an_oscillating_cylinder_stand_beside_those_measured(tmp_path):
+    """A flow that is not at all that of the experiment, at snapshots of its phases and at others."""
+    case = OscillatingCylinder(resolution=8, length=6, height=6)
+    run = case.run(tmp_path / "run", until=5.0, progress=False, output_interval=5 / 12)
+    found = {measure.name: measure.value for measure in run.measures}
+    names = [f"velocity at {phase} degrees, rms difference, U" for phase in (180, 210, 330)]
+    assert all(0.02 < found[name] < 0.3 for name in names)
+    profiles = run.profiles[1:]
+    assert len(profiles) == 24 and len({profile.file_name for profile in profiles}) == 24
+    # Where the cylinder moves fastest, at 180 degrees, the fluid before and behind it does so too.
+    beside = next(profile for profile in profiles if profile.name == "velocity at 180 degrees, u at x = 0.6 D")
+    y, u = beside.computed
+    assert np.interp(0, y, u) > 0.7 and np.isfinite(u).all()
+    middle = next(profile for profile in profiles if profile.name == "velocity at 180 degrees, u at x = 0 D")
+    assert (np.abs(middle.reference[0]) > 0.4).all()
+    coarse = case.run(tmp_path / "coarse", until=5.0, progress=False, output_interval=1.0)
+    assert len(coarse.profiles) == 1
+
+
 def test_a_sphere_as_heavy_as_the_fluid_is_refused():
     with pytest.raises(ConfigError, match="density_ratio = 1: the sphere neither sinks nor rises"):
         SettlingSphere(density_ratio=1)

@@ -78,4 +78,4 @@ class Profile:
     @property
     def file_name(self) -> str:
         """Name of the file, without suffix, that its figure is saved in."""
-        return "_".join(re.findall(r"\w+", self.name.lower()))
+        return "_".join(re.findall(r"\w+", re.sub(r"-(?=\d)", "minus ", self.name.lower())))
