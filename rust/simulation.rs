@@ -12,7 +12,7 @@ use crate::forcing::Forcing;
 use crate::frame::Travel;
 use crate::interpolation::interpolate;
 use crate::loads::loads;
-use crate::motion::{NUMBERS, Pose};
+use crate::motion::{NUMBERS, Pose, STABLY, WELL};
 use crate::neighbours::Grid;
 use crate::particles::{ParticleKind, Particles, is_late, lineage};
 use crate::report::{Clock, Report, dissipation, potential_energy};
@@ -267,10 +267,11 @@ impl<const D: usize> Simulation<D> {
     /// Δt of the next step.
     fn time_step(&self, velocity_max: f64) -> Result<f64> {
         let settings = &self.settings;
-        let response = self.flow.motion.response_limit(settings);
+        let motion = &self.flow.motion;
         if !settings.adaptive_time_step || settings.adaptive_until.is_some_and(|end| self.clock.time >= end) {
-            if settings.time_step > response {
-                let problem = format!("{} is too long for a free body: at most {response:.3e}", settings.time_step);
+            let most = motion.response_limit(settings, STABLY);
+            if settings.time_step > most {
+                let problem = format!("{} is too long for a free body: at most {most:.3e}", settings.time_step);
                 return Err(setting("time_step", problem));
             }
             return Ok(settings.time_step);
@@ -284,7 +285,7 @@ impl<const D: usize> Simulation<D> {
             let symptom = Symptom { particle: fastest.unwrap_or(0), field: "velocity", value: velocity_max };
             return Err(self.diverged(symptom, fastest_waves, velocity_max));
         }
-        let bodies = settings.acceleration_limit(self.flow.motion.acceleration()).min(response);
+        let bodies = settings.acceleration_limit(motion.acceleration()).min(motion.response_limit(settings, WELL));
         Ok(settings.time_step.min(fastest_waves).min(limits.viscous).min(limits.body_force).min(bodies))
     }
 

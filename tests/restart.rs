@@ -169,7 +169,7 @@ fn settings<const D: usize>(configuration: &Configuration, spacing: f64) -> Valu
         let inertia = if D == 2 { vec![0.01] } else { vec![0.01, 0.001, 0.0, 0.001, 0.012, 0.0, 0.0, 0.0, 0.011] };
         let free = [vec![true], vec![turns; D - 1 + turning]].concat();
         value["bodies"][2]["rigid"] = json!({
-            "mass": 0.05, "inertia": inertia, "force": vec![0.05; D], "stiffness": vec![1.0; D], "damping": vec![0.1; D],
+            "mass": 0.1, "inertia": inertia, "force": vec![0.05; D], "stiffness": vec![1.0; D], "damping": vec![0.1; D],
             "free": free, "added_mass": 0.05, "added_inertia": 0.01,
         });
     }

@@ -46,13 +46,12 @@ const LAYER: f64 = 0.75;
 /// How far [Δx] from where its velocity takes it a body may be that a rule moves.
 const JUMP: f64 = 0.5;
 
-/// ρ c S Δt over M up to which a body that sound reaches has no need of that.
-const ACOUSTIC_SHARE: f64 = 0.5;
+/// Up to which shares free bodies answer well: ρ c S Δt over M, where c is given; Δt over √(mass/stiffness) of a spring, as Ā needs some three
+/// hundred steps a period, and with fewer the fluid's answer adds energy (a tenth in three periods with sixty); Δt over mass/damping.
+pub const WELL: [f64; 3] = [0.5, 0.02, 0.5];
 
-/// Δt over √(mass/stiffness) of a spring, and over mass/damping of a damper, up to which they are followed well: Ā needs some three hundred steps
-/// a period, with fewer the fluid's answer adds energy (a tenth in three periods with sixty). They would be stable up to 2.
-const SPRING_SHARE: f64 = 0.02;
-const DAMPER_SHARE: f64 = 0.5;
+/// The same, up to which nothing grows at once.
+pub const STABLY: [f64; 3] = [1.0, 1.0, 1.0];
 
 /// The poses of all bodies that a rule moves, in their order, at a time.
 pub type MotionRule = Box<dyn FnMut(f64) -> Result<Vec<Pose>> + Send + Sync>;
@@ -373,15 +372,17 @@ impl<const D: usize> Motion<D> {
         }
     }
 
-    /// Largest Δt for free bodies: for their springs and dampers, and in a fluid whose speed of sound is given for how light they are.
-    pub fn response_limit(&self, settings: &Settings) -> f64 {
-        let sound = settings.sound_speed().map_or(0.0, |speed| speed / (ACOUSTIC_SHARE * settings.particle_spacing));
+    /// Largest Δt with which free bodies answer so, by [`WELL`] or [`STABLY`].
+    pub fn response_limit(&self, settings: &Settings, [sounding, springing, damping]: [f64; 3]) -> f64 {
+        let speed = settings.sound_speed().unwrap_or(0.0);
         let of = |body: &Moving<D>| {
-            let Some(Rigid { mass, stiffness, damping, free, .. }) = &body.rigid else { return f64::INFINITY };
-            let largest =
-                |of: &[f64]| of.iter().zip(free).map(|(value, &free)| if free { *value } else { 0.0 }).fold(0.0, f64::max);
-            let (spring, damper) = ((mass / largest(stiffness)).sqrt(), mass / largest(damping));
-            (mass / (sound * body.layer)).min(SPRING_SHARE * spring).min(DAMPER_SHARE * damper)
+            let Some(rigid) = &body.rigid else { return f64::INFINITY };
+            let free = |of: &[f64]| {
+                of.iter().zip(&rigid.free).map(|(value, &free)| if free { *value } else { 0.0 }).fold(0.0, f64::max)
+            };
+            let sound = sounding * self.spacing / (speed * body.layer);
+            let spring = springing / (free(&rigid.stiffness) * rigid.mass).sqrt();
+            rigid.mass * sound.min(spring).min(damping / free(&rigid.damping))
         };
         self.bodies.iter().map(of).fold(f64::INFINITY, f64::min)
     }
