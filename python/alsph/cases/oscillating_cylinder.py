@@ -24,11 +24,19 @@ HARMONICS = np.array([1, 3, 5])
 PHASES = (180, 210, 330)
 """Phases 360 t/T [degrees] at which the velocity beside the cylinder was measured."""
 
+STATIONS = (-0.6, 0.0, 0.6, 1.2)
+"""And the places x [D] where it was."""
+
 BESIDE = 0.01
 """How far [T] a snapshot may be from such a phase: the cylinder's velocity changes by at most 0.06 U in so much."""
 
 EXPERIMENT = "experiment (Dütsch et al. 1998)"
 SOURCE = "vorticity and stream function on a log-polar grid to 40 D, extrapolated"
+
+
+def profile_name(phase: int, component: str, x: float) -> str:
+    """Return the name of a profile of the velocity."""
+    return f"velocity at {phase} degrees, {component} at x = {x:g} D"
 
 
 class OscillatingCylinder(MovingCylinder):
@@ -46,7 +54,8 @@ class OscillatingCylinder(MovingCylinder):
         "largest force coefficient",
         *MORISON,
         "force coefficient over the last period",
-        "velocity at ",
+        *(f"velocity at {phase} degrees, rms difference, U" for phase in PHASES),
+        *(profile_name(phase, name, x) for phase in PHASES for x in STATIONS for name in "uv"),
     )
 
     keulegan_carpenter: float = Field(default=5.0, gt=0, description="Keulegan-Carpenter number KC = UT/D [-]")
@@ -141,11 +150,11 @@ class OscillatingCylinder(MovingCylinder):
         axes = ("$t/T$", "$C_x$")
         drawn = [Profile("force coefficient over the last period", axes, last[:2], known, source)]
         for phase, ((x, y, component), computed, measured) in self._velocities(run).items():
-            for station in np.unique(x):
+            for station in STATIONS:
                 for k, name in enumerate("uv"):
                     here = np.flatnonzero((x == station) & (component == k))
                     here = here[np.argsort(y[here])]
-                    title = f"velocity at {phase} degrees, {name} at x = {station:g} D"
+                    title = profile_name(phase, name, station)
                     labels = ("$y/D$", f"${name}/U$")
                     drawn.append(
                         Profile(title, labels, (y[here], computed[here]), (y[here], measured[here]), EXPERIMENT)

@@ -109,6 +109,7 @@ class Sloshing(FreeSurface):
         "crest near t = ",
         "largest error of the elevation over the largest",
         "elevation at the gauge",
+        "elevation at the gauge, experiment",
     )
 
     length: float = Field(default=2.883, gt=0, description="length of the tank [H]")
