@@ -150,6 +150,8 @@ def test_theory_of_an_irrotational_wave_is_linear_theory_for_a_low_one_and_ends_
     assert len(time) == 2000 and np.abs(level - linear).max() < 0.03 * np.abs(linear).max()
     time, _ = irrotational_level(2.85, 0.5, case.frequency, 0.0, case.gauge, 20.0)
     assert 0 < len(time) < 1000
+    short, long = (irrotational_level(2.883, 0.3, 1.1, 0.0, 0.0833, until)[0] for until in (10.0, 15.0))
+    assert len(short) == len(long) < 400
 
 
 def test_a_tank_that_sways_as_in_the_experiment_has_the_level_of_an_irrotational_wave(tmp_path):

@@ -380,7 +380,8 @@ impl<const D: usize> Motion<D> {
             let free = |of: &[f64]| {
                 of.iter().zip(&rigid.free).map(|(value, &free)| if free { *value } else { 0.0 }).fold(0.0, f64::max)
             };
-            let sound = sounding * self.spacing / (speed * body.layer);
+            let moves = rigid.free[..D].contains(&true);
+            let sound = if moves { sounding * self.spacing / (speed * body.layer) } else { f64::INFINITY };
             let spring = springing / (free(&rigid.stiffness) * rigid.mass).sqrt();
             rigid.mass * sound.min(spring).min(damping / free(&rigid.damping))
         };

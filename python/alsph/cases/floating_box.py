@@ -59,7 +59,9 @@ class FloatingBox(FreeSurface):
             raise ConfigError(f"box_length = {self.box_length:g}: {told}")
         if not (self.bottom < 1 and 0 < self.draught < self.size[1]):
             raise ConfigError(f"lift = {self.lift:g}: the box would not be in the water, or not float")
-        if self.bottom < 4 * self.particle_spacing:
+        if self.bottom + self.size[1] <= 1:
+            raise ConfigError(f"lift = {self.lift:g}: the box would be under water")
+        if min(self.bottom, 1 - self.draught) < 4 * self.particle_spacing:
             raise ConfigError(f"box_height = {self.box_height:g}: the box would stand on the floor")
         self.whole_cells("tank_length", self.tank_length)
         return self
@@ -147,11 +149,9 @@ class FloatingBox(FreeSurface):
         if late.any() and len(force):
             mean = float(np.average(force[late], weights=run.history["time_step"][late]) / self.weight)
             turn = float(np.abs(run.history["box_angle"]).max())
-            source = "Archimedes' principle"
+            known, source = np.nan if self._whole(self.lift) else 1.0, "Archimedes' principle"
             rows = [
-                Measure(
-                    "mean force of the water over the weight", mean, 1.0 if self.lift == 0 else np.nan, 0.02, source
-                ),
+                Measure("mean force of the water over the weight", mean, known, 0.02, source),
                 Measure("turn of the box, rad", turn, 0.0, 0.02, "symmetry"),
             ]
         if self._whole(self.lift) and len(time) and time[-1] > SHOWN:

@@ -28,6 +28,9 @@ IRROTATIONAL = (12, 16)
 AGREEMENT = 0.03
 """... this of the largest elevation."""
 
+STEEP = 2.0
+"""Slope of the surface with which such a wave breaks, at the latest."""
+
 MODES = np.arange(1, 400, 2)
 """Numbers of the modes of linear theory; those that are even are not driven."""
 
@@ -54,13 +57,14 @@ def irrotational_level(
     frequency, phase : float
         ω [√(g/H)] and φ [rad].
     until : float
-        Where to end [√(H/g)].
+        Where to end, above 0 [√(H/g)].
     """
     time, few = _irrotational_level(IRROTATIONAL[0], length, amplitude, frequency, phase, gauge, until)
     _, many = _irrotational_level(IRROTATIONAL[1], length, amplitude, frequency, phase, gauge, until)
-    count = min(len(few), len(many))
-    differs = np.abs(few[:count] - many[:count]) > AGREEMENT * np.abs(many).max()
-    end = int(differs.argmax()) if differs.any() else count
+    end = min(len(few), len(many))
+    difference = np.abs(few[:end] - many[:end])
+    while end and (differs := difference[:end] > AGREEMENT * np.abs(many[:end]).max()).any():
+        end = int(differs.argmax())  # what lies behind it does not tell how large the wave is, either
     return time[:end], many[:end]
 
 
@@ -90,9 +94,13 @@ def _irrotational_level(
         push = amplitude * frequency**2 * np.cos(frequency * time - phase) * x
         return np.concatenate([transform @ rise, transform @ (1 - height - (u**2 + v**2) / 2 + v * rise + push)])
 
+    def breaks(time: float, state: FloatArray) -> float:
+        return STEEP - float(np.abs(sine @ (k * state[:modes])).max())
+
+    breaks.terminal = True  # type: ignore[attr-defined]
     times = np.arange(0, until, 0.01)
     with np.errstate(all="ignore"):  # a wave that breaks
-        solved = solve_ivp(rates, (0, until), np.zeros(2 * modes), t_eval=times, rtol=1e-6, atol=1e-8)
+        solved = solve_ivp(rates, (0, until), np.zeros(2 * modes), t_eval=times, rtol=1e-6, atol=1e-8, events=breaks)
     return solved.t, np.cos(k * gauge) @ solved.y[:modes]
 
 
@@ -218,7 +226,7 @@ class Sloshing(FreeSurface):
     def profiles(self, run: Record) -> list[Profile]:
         """Return the elevation at the gauge over time."""
         time, level = Levels.read(run)
-        if not len(time):
+        if len(time) < 2:
             return []
         axes, here = ("$t\\sqrt{g/H}$", "elevation over $H$"), (time, level[0] - 1)
         known, source, _ = self._theory(time)

@@ -302,13 +302,20 @@ impl<const D: usize> Terms<D> {
             }
         }
         frame.images.fill(velocity);
+        let Flow { particles: Particles { real, pressure, .. }, frame, surface, .. } = &*flow;
+        let own = |f: usize| {
+            let f = frame.images.source(*real, f);
+            own_share(pressure[f], surface.place[f])
+        };
         match self.own.pressure_gradient {
             PressureGradient::Conservative => {
-                let Flow { particles: Particles { real, pressure, .. }, frame, surface, .. } = &*flow;
-                let own = |f: usize| own_share(pressure[f], surface.place[frame.images.source(*real, f)]);
                 self.react(flow, |s, f, r_sf| -r_sf * (pressure[s] + own(f) * pressure[f]));
             }
-            PressureGradient::Adjoint => self.react_to_tensor(flow, -1.0),
+            PressureGradient::Adjoint => {
+                let tensor = std::mem::take(&mut self.tensor);
+                self.react(flow, |s, f, r_sf| -(tensor[s].0 + tensor[f].0 * own(f)) * r_sf);
+                self.tensor = tensor;
+            }
         }
     }
 
