@@ -52,17 +52,17 @@ impl<const D: usize> Motion<D> {
         let met = self.members.par_iter().find_map_first(|&(i, shape)| {
             let Shape { body, outer, .. } = self.shape[shape];
             let Moving { body, rigid, .. } = &self.bodies[body];
-            let surface = stencil.position[i] + particles.normal[i] * particles.depth[i];
-            if !outer {
+            if rigid.is_none() || !outer {
                 return None;
             }
+            let surface = stencil.position[i] + particles.normal[i] * particles.depth[i];
             let is_in = |&a: &usize| {
                 let way = surface - stencil.position[a];
                 particles.body[a] != *body
                     && way.norm() < self.spacing
                     && way.dot(&particles.normal[a]) - particles.depth[a] < -most
             };
-            let other = rigid.as_ref().and_then(|_| stencil.solids_near(settings, i).find(is_in))?;
+            let other = stencil.solids_near(settings, i).find(is_in)?;
             Some(format!("`{}` has come into `{}`", name(*body), name(particles.body[other])))
         });
         met.map_or(Ok(()), |met| refuse(format!("{met}; what happens where bodies touch is not computed")))

@@ -71,6 +71,11 @@ class FloatingBox(FreeSurface):
         return count * round(length / count * self.resolution) / self.resolution
 
     @property
+    def _whole_lift(self) -> float:
+        """The lift, to whole spacings [H]."""
+        return self._whole(self.lift)
+
+    @property
     def size(self) -> tuple[float, float]:
         """Length and height of the box, to whole spacings [H]."""
         return self._whole(self.box_length, 2), self._whole(self.box_height)
@@ -88,7 +93,7 @@ class FloatingBox(FreeSurface):
     @property
     def bottom(self) -> float:
         """Height of the box's bottom at the start [H]."""
-        return 1 - self.draught + self._whole(self.lift)
+        return 1 - self.draught + self._whole_lift
 
     @property
     def coefficient_bodies(self) -> list[str]:
@@ -118,7 +123,7 @@ class FloatingBox(FreeSurface):
         side = beam - 1j * np.linspace(draught, 0, 1 + max(1, round(draught / ELEMENT)))
         section = tuple(np.concatenate([bottom, side[1:]]).tolist())
         time, height = linear_heave(until, section, self.weight, 1.0, self.tank_length)
-        return time, self._whole(self.lift) * (height - 1)
+        return time, self._whole_lift * (height - 1)
 
     @property
     def initial_volume(self) -> float:
@@ -149,14 +154,14 @@ class FloatingBox(FreeSurface):
         if late.any() and len(force):
             mean = float(np.average(force[late], weights=run.history["time_step"][late]) / self.weight)
             turn = float(np.abs(run.history["box_angle"]).max())
-            known, source = np.nan if self._whole(self.lift) else 1.0, "Archimedes' principle"
+            known, source = np.nan if self._whole_lift else 1.0, "Archimedes' principle"
             rows = [
                 Measure("mean force of the water over the weight", mean, known, 0.02, source),
                 Measure("turn of the box, rad", turn, 0.0, 0.02, "symmetry"),
             ]
-        if self._whole(self.lift) and len(time) and time[-1] > SHOWN:
+        if self._whole_lift and len(time) and time[-1] > SHOWN:
             exact = np.interp(time, *self.linear_heave(time[-1]))
-            worst = np.abs(run.history["box_displacement_y"] - exact).max() / abs(self._whole(self.lift))
+            worst = np.abs(run.history["box_displacement_y"] - exact).max() / abs(self._whole_lift)
             rows.append(Measure("largest difference over the lift", float(worst), 0.0, 0.15, SOURCE))
         return rows + self.energy_measures(run)
 
@@ -169,7 +174,7 @@ class FloatingBox(FreeSurface):
         if "box_displacement_y" not in run.history:
             return []
         time, known, source = run.history["time"], (np.empty(0), np.empty(0)), ""
-        if self._whole(self.lift) and len(time) and time[-1] > 0:
+        if self._whole_lift and len(time) and time[-1] > 0:
             known, source = self.linear_heave(time[-1]), SOURCE
         axes = ("$t\\sqrt{g/H}$", "height of the box over that at the start, $/H$")
         return [Profile("heave", axes, (time, run.history["box_displacement_y"]), known, source)]
