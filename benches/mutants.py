@@ -1,7 +1,7 @@
 """Faults put into the Python code one at a time, by mutmut, and which of them the quick tests do not notice.
 
 make mutants-python                     # a random sample of each module's mutants
-make mutants-python MUTANTS="--modules analysis window --sample 1000"
+make mutants-python MUTANTS="--modules averages window --sample 1000"
 
 Nothing in the working tree is changed: mutmut works in target/mutants, where the package is called `src` as it wants.
 A mutant is tried once, with --again until a test has noticed it; without target/mutants all are tried anew.

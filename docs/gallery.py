@@ -20,6 +20,7 @@ FIELDS = {
     "concentric_release": "velocity",
     "dam_break": "pressure",
     "dam_break_obstacle": "pressure",
+    "dam_break_structure": "pressure",
     "elliptical_drop": "pressure",
     "floating_box": "pressure",
     "nozzle": "velocity",

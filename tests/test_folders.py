@@ -11,10 +11,11 @@ import h5py
 import numpy as np
 import pytest
 from alsph import Run
+from alsph.analysis.measures import Profile
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import checkpoint, reading
-from alsph.folder.run_folder import RunFolder
+from alsph.folder.run_folder import OWN, RunFolder
 from alsph.running.control import Control
 from alsph.running.start import complete, resume
 from alsph.study.state import state
@@ -237,3 +238,12 @@ def test_a_run_folder_of_devices_has_an_end(path, name):
     (path / name).symlink_to("/dev/zero")
     with pytest.raises(RunFolderError, match=f"{name}: unreadable.*no regular file"):
         Run(path).history  # noqa: B018
+
+
+PROFILES = ["flow rate", "velocity downstream", "force coefficient over the last period", "velocity of the sphere"]
+
+
+@pytest.mark.parametrize("name", [*PROFILES, "velocity at 180 degrees, u at x = -0.6 D", "velocity at tU/D = 1.50"])
+def test_figures_of_a_case_of_ours_go_with_its_run(name):
+    nothing = np.empty(0), np.empty(0)
+    assert OWN.fullmatch(f"{Profile(name, ('x', 'y'), nothing, nothing, '').file_name}.png")

@@ -15,6 +15,7 @@ from alsph.cases.heave import linear_heave
 from alsph.cases.heaving_cylinder import MASS, SECTION
 from alsph.cases.sloshing import irrotational_level
 from alsph.errors import ConfigError
+from alsph.folder.run_folder import OWN
 from alsph.geometry.lattice import cell_centres, lattice
 from alsph.geometry.particles import join
 from alsph.geometry.solids import body_layers, walls
@@ -426,6 +427,7 @@ def test_a_study_knows_beforehand_what_a_run_measures(model, tmp_path):
     begins = tuple(name for name in measures if name.endswith("= "))
     assert run.measures and all(each.name in measures or each.name.startswith(begins) for each in run.measures)
     assert all(each.name in profiles for each in run.profiles)
+    assert all(OWN.fullmatch(f"{each.file_name}.png") for each in run.profiles)  # removed with the run
 
 
 def test_the_case_of_ones_own_in_the_docs_runs():
@@ -542,6 +544,25 @@ def test_a_dam_breaks_between_solids_as_between_slip_walls(scheme, seed):
     energy = rows["kinetic_energy"] + rows["potential_energy"]
     assert (energy - np.minimum.accumulate(energy)).max() < 0.01 * energy[0]
     assert rows["fluid"][-1] >= 0.99 * rows["fluid"][0]
+
+
+def test_a_dam_breaks_on_a_floor_that_it_sticks_to(tmp_path):
+    """Friction holds the water back; sensors in solids feel it, and the end wall stands at whole spacings."""
+    runs = {
+        reynolds: cases.DamBreak(resolution=16, walls="solid", reynolds=reynolds).run(
+            tmp_path / f"{reynolds:g}", until=3.6, progress=False
+        )
+        for reynolds in (1e6, 300)
+    }
+    fronts, impulses = (
+        [next(each.value for each in run.measures if each.name.startswith(name)) for run in runs.values()]
+        for name in ("front at t = 2", "impulse at P1")
+    )
+    assert fronts[0] == pytest.approx(4.665, rel=0.07) and fronts[1] < 0.95 * fronts[0]
+    assert 0.2 < impulses[1] < 0.8 * impulses[0]
+    assert not any("drag" in remark for remark in runs[300].remarks)
+    with pytest.raises(ConfigError, match="walls = 'solid': of a tank in 2-D"):
+        cases.DamBreak(dimensions=3, walls="solid")
 
 
 def test_a_box_floats_at_its_draught_and_heaves_about_it(tmp_path):

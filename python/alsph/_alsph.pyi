@@ -84,7 +84,7 @@ class Simulation:
         """Prescribe the velocity of the inlet buffer particles, (d,) or (m, d) in the order of `inflow_position`."""
 
 def time_step_limits(settings: str, velocity_max: float) -> dict[str, float]:
-    """Largest Δt: ``courant``, ``penalty``, ``viscous``, ``body_force`` (or inf), and ``lambda_max``: λ_max Δx²."""
+    """Largest Δt: ``courant``, ``penalty``, ``acoustic``, ``viscous``, ``body_force``; ``lambda_max`` is λ_max Δx²."""
 
 def kernels() -> dict[str, float]:
     """Return the kernels by name, each with its support radius over the smoothing length."""

@@ -56,13 +56,16 @@ def _time(value: Any, _: Any) -> Any:
     return value if value is None or isinstance(value, str) else TIME.validate_python(value)
 
 
+OR_CONVERGED = "; or converged: as soon as mean drag, lift and shedding are known well enough"
+"""What the description of `until` says of that, which only bodies in a stream have."""
+
+
 class RunSettings(Parameters):
     """Settings of a run: how long, on how many threads, and what is written when."""
 
     until: Annotated[float | Converged | None, WrapValidator(_time)] = Field(
         default=None,
-        description="end time [D/U]; the case's own default if not given; or converged: as soon as mean drag, lift and "
-        "shedding are known well enough",
+        description="end time [D/U]; the case's own default if not given" + OR_CONVERGED,
     )
     uncertainty: float | None = Field(
         default=None,

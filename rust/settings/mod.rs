@@ -77,7 +77,7 @@ pub struct Settings {
     /// Order of the viscous term in the particle spacing, 2 or 4.
     pub viscous_order: u8,
     pub shifting: Shifting,
-    /// β of the maximum-velocity shift.
+    /// β of the shift, of `strain` and `maximum_velocity`.
     pub shift_coefficient: f64,
     /// Largest shift in a step over Δx; of what touches a body the way of the fastest in the step, if that is more.
     pub shift_limit: f64,

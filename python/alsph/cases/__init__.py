@@ -29,6 +29,7 @@ from alsph.cases.cylinder import Cylinder
 from alsph.cases.cylinder_pair import CylinderPair
 from alsph.cases.dam_break import DamBreak
 from alsph.cases.dam_break_obstacle import DamBreakObstacle
+from alsph.cases.dam_break_structure import DamBreakStructure
 from alsph.cases.elliptical_drop import EllipticalDrop
 from alsph.cases.floating_box import FloatingBox
 from alsph.cases.free_surface import FreeSurface
@@ -64,6 +65,7 @@ CASES: dict[str, type[Case]] = {
         *(
             DamBreak,
             DamBreakObstacle,
+            DamBreakStructure,
             StandingWave,
             StillWater,
             Sloshing,
@@ -90,6 +92,7 @@ __all__ = [
     "Couette",
     "DamBreak",
     "DamBreakObstacle",
+    "DamBreakStructure",
     "Cylinder",
     "CylinderPair",
     "Domain",

@@ -42,6 +42,13 @@ class ConcentricRelease(Case):
     reynolds: float = Field(default=1e4, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, ge=8, description="particles across the cylinder, D/Δx [-]")
     density_ratio: float = Field(default=2.0, gt=0, description="density of the cylinder over that of the fluid [-]")
+    courant: float | None = Field(
+        default=None,
+        gt=0,
+        le=1,
+        description=f"Courant number u_max Δt/Δx of a step, which the penalty follows; if not given {COURANT:g}, or "
+        "none where time_step or penalty_constant are [-]",
+    )
     vessel: float = Field(default=2.0, gt=1.3, description="diameter of the vessel [D]")
 
     @model_validator(mode="before")

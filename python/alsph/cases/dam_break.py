@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
@@ -15,12 +17,15 @@ from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.free_surface import FreeSurface, Sensors
+from alsph.cases.sensors import WallSensors
 from alsph.cases.series import Series
 from alsph.engine.output import Output
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError
-from alsph.geometry.domain import Boundary, Domain
+from alsph.geometry.domain import Boundary, Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, lattice
+from alsph.geometry.particles import Kind, join
+from alsph.geometry.solids import Solid, walls
 
 FRONT = {1.0: 2.947, 2.0: 4.665}
 """Front [H] at times [√(H/g)] of a column 2H long: WCSPH with 400 particles over H, the authors' own
@@ -86,7 +91,8 @@ class Front(Series):
 
     def values(self, simulation: Simulation) -> FloatArray:
         """Return the present front (1,)."""
-        return np.array([self.case.front(simulation.state()["position"])])
+        state = simulation.state()
+        return np.array([self.case.front(state["position"][state["kind"] == Kind.FLUID])])
 
 
 class DamBreak(FreeSurface):
@@ -109,6 +115,9 @@ class DamBreak(FreeSurface):
     tank_height: float = Field(default=3.0, gt=1, description="height above which spray is lost [H]")
     dimensions: Literal[2, 3] = Field(default=2, description="number of space dimensions")
     width: float = Field(default=0.5, gt=0, description="width of column and tank in 3-D [H]")
+    walls: Literal["slip", "solid"] = Field(
+        default="slip", description="mirrors without friction, or solid particles, to which the water sticks, in 2-D"
+    )
 
     @model_validator(mode="after")
     def _the_tank_holds_the_column(self) -> Self:
@@ -117,6 +126,8 @@ class DamBreak(FreeSurface):
         self.whole_cells("length", self.length)
         if self.dimensions == 3:
             self.whole_cells("width", self.width)
+            if self.walls == "solid":
+                raise ConfigError("walls = 'solid': of a tank in 2-D; leave out dimensions = 3, or take walls = 'slip'")
         elif self.width != type(self).model_fields["width"].default:
             raise ConfigError(f"width = {self.width:g}: of a tank in 3-D; give dimensions = 3, too, or leave it out")
         return self
@@ -134,10 +145,25 @@ class DamBreak(FreeSurface):
     def domain(self) -> Domain:
         """Return the tank, whose top is open."""
         across = [self.width] if self.dimensions == 3 else []
-        lengths = [self.tank_length, *across, self.tank_height]
-        sides: list[tuple[Boundary, Boundary]] = [("slip", "slip")] * len(lengths)
-        sides[-1] = ("slip", "air")
+        lengths = [self.end, *across, self.tank_height]
+        wall: Boundary = "none" if self.walls == "solid" else "slip"
+        sides: list[tuple[Boundary, Boundary]] = [(wall, wall)] * len(lengths)
+        sides[-1] = (wall, "air")
         return Domain([0] * len(lengths), lengths, sides)
+
+    @property
+    def end(self) -> float:
+        """Where the end wall is [H]: walls of solids stand at whole spacings."""
+        return float(self.whole(self.tank_length)) if self.walls == "solid" else self.tank_length
+
+    def bodies(self) -> list[SolidBody]:
+        """Return the tank, where it is of solids."""
+        return [SolidBody("tank", (0, 0))] if self.walls == "solid" else []
+
+    @property
+    def coefficient_bodies(self) -> list[str]:
+        """Name of the tank, where it is of solids."""
+        return ["tank"] if self.walls == "solid" else []
 
     @property
     def middle(self) -> FloatArray:
@@ -155,16 +181,29 @@ class DamBreak(FreeSurface):
         if self.dimensions == 3:
             cells.insert(1, self.whole_cells("width", self.width))
         position = lattice(*(cell_centres(count, self.particle_spacing) for count in cells))
-        return self.fluid(
+        water = self.fluid(
             position, np.zeros_like(position), column_pressure(position[:, 0], position[:, -1], self.length)
         )
+        return join(water, self._tank.particles()) if self.walls == "solid" else water
+
+    @cached_property
+    def _tank(self) -> Solid:
+        tank = walls(shapely.box(0, 0, self.end, self.tank_height + 1), self.particle_spacing, self.support_layers)
+        return tank.where(tank.position[:, 1] < self.tank_height)
+
+    def particle_estimate(self) -> int:
+        """Return about how many particles there are, with those of the walls."""
+        return super().particle_estimate() + (len(self._tank.position) if self.walls == "solid" else 0)
 
     def front(self, position: FloatArray) -> float:
         """Return how far the water has come [H]: half a spacing before its third foremost particle, or to the wall."""
-        return min(float(np.sort(position[:, 0])[-3:][0] + self.particle_spacing / 2), self.tank_length)
+        return min(float(np.sort(position[:, 0])[-3:][0] + self.particle_spacing / 2), self.end)
 
     def outputs(self) -> list[Output]:
         """Return the records of the front and of the sensors in the end wall."""
+        if self.walls == "solid":
+            points = {name: (np.array([self.end, each.height]), np.array([-1.0, 0])) for name, each in SENSORS.items()}
+            return [Front(self), WallSensors(points, 0, np.zeros(2), self.particle_spacing)]
         places = {name: self.disc(sensor.height, sensor.diameter) for name, sensor in SENSORS.items()}
         return [Front(self), Sensors(places, self.particle_spacing)]
 

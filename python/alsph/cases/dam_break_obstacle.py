@@ -2,37 +2,20 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import Field
 
 from alsph import reference
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
-from alsph.cases.dam_break import column_pressure
-from alsph.cases.free_surface import FreeSurface
+from alsph.cases.obstacle import Obstacle
 from alsph.cases.sensors import WallSensors
 from alsph.engine.output import Output
-from alsph.geometry.domain import Domain, SolidBody
-from alsph.geometry.lattice import cell_centres, lattice
-from alsph.geometry.particles import join
-from alsph.geometry.solids import Solid
 
 DEPTH = 0.55
 """H of the experiment [m]."""
-
-TANK = np.array([3.22, 0.5, 1.5]) / DEPTH
-"""Half of the tank up to its plane of symmetry, as high as spray may go [H]."""
-
-COLUMN = 1.228 / DEPTH
-"""Length of the column [H]."""
-
-BOX = np.array([[2.3955, 0.0, 0.0], [2.5565, 0.2015, 0.161]]) / DEPTH
-"""Corners of half of the box [H]."""
 
 SENSORS = {"P1": 0.021 / DEPTH, "P3": 0.101 / DEPTH}
 """Heights of the sensors in the face of the box that the water meets, 0.053 H beside its middle [H]."""
@@ -50,7 +33,7 @@ def mean_name(sensor: str, window: tuple[float, float]) -> str:
     return f"pressure at {sensor}, mean over t = {window[0]:g} to {window[1]:g}, ρgH"
 
 
-class DamBreakObstacle(FreeSurface):
+class DamBreakObstacle(Obstacle):
     """A column of water H high that is let go in a tank with a box on its floor (Kleefsman et al. 2005), 3-D.
 
     The half up to the plane of symmetry is computed; walls are slip walls, the box is of solid particles. All lengths
@@ -59,80 +42,20 @@ class DamBreakObstacle(FreeSurface):
 
     name: ClassVar[str] = "dam_break_obstacle"
     title: ClassVar[str] = "dam break against a box"
-    in_space: ClassVar[int] = 3
-    velocity_max: ClassVar[float] = 2.5
-    splashes: ClassVar[bool] = True
+    tank = (3.22 / DEPTH, 0.5 / DEPTH, 1.5 / DEPTH)
+    column = 1.228 / DEPTH
+    corners = ((2.3955 / DEPTH, 0.0, 0.0), (2.5565 / DEPTH, 0.2015 / DEPTH, 0.161 / DEPTH))
     later_names: ClassVar[tuple[str, ...]] = (
-        *FreeSurface.later_names,
+        *Obstacle.later_names,
         *(f"time of arrival at {name}, √(H/g)" for name in SENSORS),
         *(mean_name(name, window) for name in SENSORS for window in WINDOWS),
         *(f"pressure at {name}" for name in SENSORS),
     )
 
-    resolution: int = Field(default=20, ge=8, description="particles over the depth of the water, H/Δx [-]")
-
     @property
     def default_until(self) -> float:
         """Until the water has fallen back from the box."""
         return 6.0
-
-    @property
-    def middle(self) -> FloatArray:
-        """Point that slices for pictures go through [H]: beside the plane of symmetry."""
-        return np.array([TANK[0] / 2, PLACE, 0.05])
-
-    def _whole(self, lengths: FloatArray) -> FloatArray:
-        return np.asarray(np.round(lengths * self.resolution) / self.resolution)
-
-    @property
-    def box(self) -> FloatArray:
-        """Corners (2, 3) of half of the box [H]."""
-        return self._whole(BOX)
-
-    def domain(self) -> Domain:
-        """Return half of the tank, whose top is open."""
-        return Domain((0, 0, 0), tuple(self._whole(TANK)), [("slip", "slip"), ("slip", "slip"), ("slip", "air")])
-
-    def bodies(self) -> list[SolidBody]:
-        """Return the box."""
-        return [SolidBody("box", tuple(self.box.mean(axis=0) * [1, 0, 1]))]
-
-    @property
-    def coefficient_bodies(self) -> list[str]:
-        """Name of the box."""
-        return ["box"]
-
-    @property
-    def initial_volume(self) -> float:
-        """That of half of the column [H³]."""
-        return float(COLUMN * TANK[1])
-
-    def particle_estimate(self) -> int:
-        """Return about how many particles there are, with those of the box."""
-        return super().particle_estimate() + len(self._solid.position)
-
-    def particles(self) -> dict[str, NDArray[Any]]:
-        """Return the column at rest with the pressure of its first instant, and the box."""
-        counts = np.rint([COLUMN * self.resolution, TANK[1] * self.resolution, self.resolution]).astype(int)
-        position = lattice(*(cell_centres(count, self.particle_spacing) for count in counts))
-        water = self.fluid(position, np.zeros_like(position), column_pressure(position[:, 0], position[:, -1], COLUMN))
-        return join(water, self._solid.particles(np.zeros(3)))
-
-    @cached_property
-    def _solid(self) -> Solid:
-        """Cells of the box, which stands on the floor and reaches to the plane of symmetry."""
-        (left, _, _), (right, side, top) = self.box
-        counts = np.rint((self.box[1] - self.box[0]) * self.resolution).astype(int)
-        position = lattice(*(cell_centres(count, self.particle_spacing) for count in counts)) + self.box[0]
-        x, y, z = position.T
-        depths = np.stack([x - left, right - x, side - y, top - z])
-        normals = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-        least = depths.min(axis=0)
-        near = depths < least + 1e-6 * self.particle_spacing  # in edges and corners the bisector
-        normal = near.T.astype(float) @ normals
-        size = np.linalg.norm(normal, axis=1, keepdims=True)
-        kept = least < self.support_layers * self.particle_spacing
-        return Solid(position, np.divide(normal, size, out=np.zeros_like(normal), where=size > 0), least).where(kept)
 
     def outputs(self) -> list[Output]:
         """Return the record of the sensors."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure
@@ -137,7 +137,8 @@ class Sensors(Series):
 class FreeSurface(Case):
     """A fluid with a free surface, beyond which is air of no pressure.
 
-    In cases with gravity D is H, the depth of the fluid, U = √(gH) and g = 1, hence times in √(H/g). A step is that of
+    In cases with gravity g = 1 and, if `symbols` says nothing else, D is H, the depth of the fluid, U = √(gH) and times
+    are in √(H/g). A step is that of
     its scheme with operators that keep momentum and energy where a particle has no neighbours (docs/free_surface.md);
     inlets and outlets are not there yet.
     """
@@ -145,7 +146,7 @@ class FreeSurface(Case):
     symbols: ClassVar[Symbols] = WATER
     settles: ClassVar[bool] = False
     picture_axis: ClassVar[str] = "y"
-    idle: ClassVar[tuple[str, ...]] = ("tolerance", "viscous_theta")
+    idle: ClassVar[tuple[str, ...]] = ("tolerance", "viscous_theta", "wall_pressure", "laplacian_correction")
     later_names: ClassVar[tuple[str, ...]] = (ENERGY,)
     usual_sound_speed: ClassVar[float] = 20.0
     gravity: ClassVar[bool] = True
@@ -170,10 +171,14 @@ class FreeSurface(Case):
         gt=0,
         le=1,
         description="Courant number of a step, which the penalty follows: the larger of u_max and U times Δt/Δx; 0.2 "
-        "if not given, or none where time_step, penalty_constant or algorithm 2 are [-]",
+        "if not given, or none where time_step, penalty_constant or, with alsph, algorithm 2 are [-]",
     )
     projection_sweeps: int = Field(
-        default=4, ge=0, le=1000, description="projection sweeps after the iterations of a step [-]"
+        default=4,
+        ge=0,
+        le=1000,
+        description="projection sweeps after the iterations of a step; with isph and explicit_isph 1 if not given, "
+        "with wcsph and edac none [-]",
     )
     algorithm: Literal["midpoint", 2] = Field(
         default="midpoint", description="derivatives in the middle of the step, or at initial positions"
@@ -219,8 +224,9 @@ class FreeSurface(Case):
     @model_validator(mode="before")
     @classmethod
     def _step_of_a_surface(cls, values: dict[str, Any]) -> dict[str, Any]:
-        paper = any(values.get(name) is not None for name in ("courant", "time_step", "penalty_constant"))
-        return values if paper or values.get("algorithm") == 2 else values | {"courant": COURANT}
+        given = any(values.get(name) is not None for name in ("courant", "time_step", "penalty_constant"))
+        paper = values.get("algorithm") == 2 and values.get("scheme") in (None, "alsph")
+        return values if given or paper else values | {"courant": COURANT}
 
     @property
     def reference_velocity(self) -> float:
@@ -256,6 +262,10 @@ class FreeSurface(Case):
         """Return about how many particles there are: those of the fluid."""
         return round(self.initial_volume * float(self.resolution) ** self.space_dimensions)
 
+    def whole(self, lengths: ArrayLike) -> FloatArray:
+        """Return lengths to the nearest whole number of particle spacings [D]."""
+        return np.asarray(np.rint(np.asarray(lengths) * self.resolution) / self.resolution)
+
     def fluid(self, position: FloatArray, velocity: FloatArray, pressure: FloatArray) -> dict[str, NDArray[Any]]:
         """Return fluid particles, whose pressure is not below that of the air unless tension is allowed."""
         pressure = pressure if self.tension else np.maximum(pressure, 0.0)
@@ -277,9 +287,10 @@ class FreeSurface(Case):
     def energy_measures(self, run: Record) -> list[Measure]:
         """Return the largest rise of kinetic and potential energy above their least value before, over their start.
 
-        None where a force that depends on time does work, too.
+        None where a force that depends on time or bodies that move do work, too.
         """
-        if not len(run.history.get("potential_energy", [])) or "forcing" in self.rules:
+        moved = "forcing" in self.rules or any(body.moves or body.rigid for body in self.checked_bodies)
+        if moved or not len(run.history.get("potential_energy", [])):
             return []
         energy = run.history["kinetic_energy"] + run.history["potential_energy"]
         rise = (energy - np.minimum.accumulate(energy)).max() / energy[0]

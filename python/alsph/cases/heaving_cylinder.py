@@ -146,10 +146,6 @@ class HeavingCylinder(FreeSurface):
             Measure("largest difference over the lift", float(difference), 0.0, 0.05, SOURCE),
         ]
 
-    def energy_measures(self, run: Record) -> list[Measure]:
-        """Return none: the cylinder has energy, too."""
-        return []
-
     def profiles(self, run: Record) -> list[Profile]:
         """Return the height over time beside linear theory."""
         time, height = self._heave(run)

@@ -201,7 +201,7 @@ class Method(Parameters):
         gt=0,
         le=1,
         description="Courant number u_max Δt/Δx of a step, which the penalty follows; if not given 0.3, or none where "
-        "time_step, penalty_constant or an algorithm of the paper are [-]",
+        "time_step, penalty_constant or, with alsph, an algorithm of the paper are [-]",
     )
     time_step: float | None = Field(
         default=None,

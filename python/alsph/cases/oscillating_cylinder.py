@@ -86,7 +86,7 @@ class OscillatingCylinder(MovingCylinder):
         return share, run.history["drag_coefficient"][within], run.history["cylinder_velocity_x"][within]
 
     def measures(self, run: Record) -> list[Measure]:
-        """Return the largest force coefficient and Morison's coefficients over the last whole period."""
+        """Return force coefficients over the last whole period, and how far velocities are from the experiment's."""
         last = self.last_period(run)
         if last is None:
             return []
@@ -139,7 +139,7 @@ class OscillatingCylinder(MovingCylinder):
         return found
 
     def profiles(self, run: Record) -> list[Profile]:
-        """Return the force coefficient over the last whole period."""
+        """Return the force coefficient over the last whole period, and velocities beside the cylinder."""
         last = self.last_period(run)
         if last is None:
             return []

@@ -137,10 +137,6 @@ class RollingTank(FreeSurface):
             rows.append(Measure(f"swing of the pressure at {name}, ρgH", swings[0], swings[1], 0.15, SOURCE))
         return rows
 
-    def energy_measures(self, run: Record) -> list[Measure]:
-        """Return none: the tank does work."""
-        return []
-
     def profiles(self, run: Record) -> list[Profile]:
         """Return the pressure at the sensors over time."""
         time, pressure = WallSensors.read(run)

@@ -191,7 +191,7 @@ class Sloshing(FreeSurface):
         return np.asarray(((forced - free) * share) @ np.cos(wave * x))
 
     def measures(self, run: Record) -> list[Measure]:
-        """Return the elevation at the gauge beside linear theory, or the crests of the experiment."""
+        """Return the elevation at the gauge beside theory, linear or not, and the crests beside the experiment's."""
         time, level = Levels.read(run)
         if len(time) < 2:
             return []

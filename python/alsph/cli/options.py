@@ -119,6 +119,7 @@ def idle(model: type[cases.Case], case: cases.Case | None) -> set[str]:
             "inlet_velocity": [*domain.inlets()],
             "surface_interval": case.surface_points(),
             "initial_run": not domain.meets_air,
+            **dict.fromkeys(config.OF_CONVERGED, case.is_averaged),
         }
         found |= {name for name, on in acts.items() if not on}
     return found
@@ -180,7 +181,7 @@ def _options(
         flag = f"--{prefix}{name}".replace("_", "-")
         option = typer.Option(
             f"{flag}/--no-{flag[2:]}" if kind is bool else flag,
-            help=symbols(model.describe(name)).replace(OWN_DEFAULT, until) + _default(model, name, required),
+            help=symbols(_told(model, name, idle)).replace(OWN_DEFAULT, until) + _default(model, name, required),
             hidden=name in idle,
             show_default=False,
             rich_help_panel=section,
@@ -193,6 +194,12 @@ def _options(
             default=None,
             annotation=Annotated[Union[kind, None], option],  # noqa: UP007
         )
+
+
+def _told(model: type[Parameters], name: str, idle: Collection[str]) -> str:
+    """Return what is told of a parameter: of `until` only what the case can do."""
+    text = model.describe(name)
+    return text.replace(config.OR_CONVERGED, "") if {*config.OF_CONVERGED} <= {*idle} else text
 
 
 def _default(model: type[Parameters], name: str, required: str) -> str:

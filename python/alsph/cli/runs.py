@@ -1,4 +1,4 @@
-"""The commands of a run folder: resume, repeat, info, watch, plot, animate and export.
+"""The commands of a run folder: resume, repeat, info, watch, plot, animate and export; and their list.
 
 What does the work is imported where it is called, so that help comes at once.
 """

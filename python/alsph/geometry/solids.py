@@ -23,9 +23,9 @@ class Solid:
     Attributes
     ----------
     position
-        Positions (n, 2).
+        Positions (n, d).
     normal
-        Unit normals (n, 2) of the surface, from the solid into the fluid; zero midway between parallel faces.
+        Unit normals (n, d) of the surface, from the solid into the fluid; zero midway between parallel faces.
     depth
         Distances below the surface (n,).
     """
@@ -39,7 +39,7 @@ class Solid:
         return Solid(self.position[chosen], self.normal[chosen], self.depth[chosen])
 
     def moved(self, offset: FloatArray) -> Solid:
-        """Return the particles moved by `offset` (2,)."""
+        """Return the particles moved by `offset` (d,)."""
         return Solid(self.position + offset, self.normal, self.depth)
 
     def extruded(self, columns: FloatArray) -> Solid:

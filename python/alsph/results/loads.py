@@ -76,7 +76,7 @@ class Loads(Fields):
 
     @cached_property
     def window(self) -> Window:
-        """Averaging window, found from the lift and the drag (see :func:`alsph.analysis.averages.averaging_window`)."""
+        """Averaging window, found from the lift and the drag (see :func:`alsph.analysis.window.averaging_window`)."""
         time = self.history["time"]
         if not self.config.case.settles:
             return averages.whole_record(time)

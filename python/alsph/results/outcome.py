@@ -32,7 +32,7 @@ def outcome(run: Record, until: str) -> list[str]:
     found += lost(run)
     if run.body and run.window.edges.size:
         found += unsettled(run.window)
-        if run.drag.mean < 0 and not has_moved(run.history):
+        if run.drag.mean < 0 and not (has_moved(run.history) or has_surface(run.history)):
             found.append(f"unphysical: mean drag coefficient {run.drag.mean}; a stream drags a body at rest along")
     return found
 

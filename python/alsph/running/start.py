@@ -55,8 +55,8 @@ def run(case: Case, folder: Path, control: Control | None = None, *, force: bool
 def complete(config: Config, path: Path, control: Control | None = None) -> Run:
     """Return the finished run of a case in a folder: as it is there, resumed, or run from the start.
 
-    A folder with another case, inflow or beginning in it, or without a checkpoint that can be read, is replaced. The
-    number of threads is that of `config`.
+    A folder with another case, beginning or other rules in it, or without a checkpoint that can be read, is replaced.
+    The number of threads is that of `config`.
     """
     if (path / "case.toml").exists():
         folder = RunFolder(path)

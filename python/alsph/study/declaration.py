@@ -211,7 +211,7 @@ class Study(Parameters):
 def digest(configuration: Config, *without: str) -> str:
     """Return a hash, in hexadecimal digits, of all that a run's result depends on, some parameters excepted.
 
-    A run that it begins with counts by its last flow, whatever it is called; an inflow by the velocities that it gives.
+    A run that it begins with counts by its last flow, whatever it is called; rules of place and time by what they give.
 
     Raises
     ------

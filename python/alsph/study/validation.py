@@ -112,6 +112,7 @@ FULL = (
     Entry("oscillating_cylinder", (10, 20), until=15.0),
     Entry("dam_break", (20, 40, 80), until=2.0),
     Entry("dam_break_obstacle", (20,), until=6.0),
+    Entry("dam_break_structure", (30,), until=10.0),
     Entry("floating_box", (20, 40), until=8.0),
     Entry("heaving_cylinder", (20,), until=12.0),
     Entry("still_water", (20, 40), until=50.0),
