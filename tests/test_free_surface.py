@@ -546,6 +546,16 @@ def test_a_dam_breaks_between_solids_as_between_slip_walls(scheme, seed):
     assert rows["fluid"][-1] >= 0.99 * rows["fluid"][0]
 
 
+@pytest.mark.parametrize(("length", "sources"), [(1.0, 1), (0.5, 2)])
+def test_columns_of_other_lengths_stand_beside_their_experiments(length, sources, tmp_path):
+    """They lead by some per cent, and the measured curves begin at the column's end."""
+    run = cases.DamBreak(resolution=16, length=length).run(tmp_path / "run", until=2.0, progress=False)
+    fronts = [each for each in run.measures if each.name.startswith("front")]
+    assert len(fronts) == 1 + sources and all(0.99 < each.value / each.reference < 1.15 for each in fronts)
+    known = [profile.reference for profile in run.profiles if profile.name.startswith("front, ")]
+    assert len(known) == sources and all(front[0] < 1.3 * length for _, front in known)
+
+
 def test_a_dam_breaks_on_a_floor_that_it_sticks_to(tmp_path):
     """Friction holds the water back; sensors in solids feel it, and the end wall stands at whole spacings."""
     runs = {

@@ -31,6 +31,40 @@ FRONT = {1.0: 2.947, 2.0: 4.665}
 """Front [H] at times [√(H/g)] of a column 2H long: WCSPH with 400 particles over H, the authors' own
 (TrixiParticles.jl, the dam break of its validation)."""
 
+
+class Column(NamedTuple):
+    """The front of a column that was let go in an experiment.
+
+    Attributes
+    ----------
+    source, curve : str
+        Who measured it, and the file of the front over time, ``dam_break_front_CURVE.csv``.
+    scale : float
+        The file's unit of length [H] and of time [√(H/g)].
+    """
+
+    source: str
+    curve: str
+    scale: float
+
+    def measured(self) -> tuple[FloatArray, FloatArray]:
+        """Return time (n,) [√(H/g)] and front (n,) [H]."""
+        time, front = self.scale * reference.table(f"dam_break_front_{self.curve}.csv")
+        return time, front
+
+
+COLUMNS = {
+    0.5: (
+        Column("Martin and Moyce (1952)", "martin_moyce_2", 0.5),
+        Column("Koshizuka and Oka (1996)", "koshizuka_oka", 0.5),
+    ),
+    1.0: (Column("Martin and Moyce (1952)", "martin_moyce_1", 1.0),),
+}
+"""Experiments with columns of other lengths [H]."""
+
+COMPUTATION = "inviscid SPH, H/Δx = 400 (TrixiParticles)"
+"""Where :data:`FRONT` and the curve that it is of come from."""
+
 TERMS = np.arange(1, 200, 2)
 """Numbers of the terms of the Fourier series."""
 
@@ -105,6 +139,7 @@ class DamBreak(FreeSurface):
         *FreeSurface.later_names,
         "front at t = ",
         "front",
+        *(f"front, {each.source}" for columns in COLUMNS.values() for each in columns),
         *(impulse_name(sensor, window) for sensor in SENSORS for window in WINDOWS),
         *(f"pressure at {sensor}" for sensor in SENSORS),
     )
@@ -217,8 +252,8 @@ class DamBreak(FreeSurface):
         return np.stack([wall, *sides, height + up[inside]], axis=1)
 
     def measures(self, run: Record) -> list[Measure]:
-        """Return the front beside an inviscid computation, impulses beside experiments, and what energy was made."""
-        rows = [*self._fronts(run), *self._impulses(run)] if self._is_compared else []
+        """Return the front beside an inviscid computation or experiments, impulses, and what energy was made."""
+        rows = [*self._fronts(run), *(self._impulses(run) if self._is_compared else [])]
         return rows + self.energy_measures(run)
 
     @property
@@ -228,10 +263,17 @@ class DamBreak(FreeSurface):
     def _fronts(self, run: Record) -> Iterator[Measure]:
         """Yield the front where the run has come so far: before it meets the wall."""
         time, front = Front.read(run)
-        source = "inviscid SPH, H/Δx = 400 (TrixiParticles)"
-        for at, known in FRONT.items():
+        rows = [(at, f"front at t = {at:g}, H", known, COMPUTATION, 0.05) for at, known in FRONT.items()]
+        if not self._is_compared:
+            rows = []
+            for column in COLUMNS.get(self.length, ()):
+                curve, source = column.measured(), f"experiment, {column.source}"
+                for at in (at for at in FRONT if at <= curve[0][-1]):
+                    name = f"front at t = {at:g} beside {column.source}, H"
+                    rows.append((at, name, float(np.interp(at, *curve)), source, 0.15))
+        for at, name, known, source, tolerance in rows:
             if len(time) and time[0] <= at <= time[-1]:
-                yield Measure(f"front at t = {at:g}, H", float(np.interp(at, time, front[0])), known, 0.05, source)
+                yield Measure(name, float(np.interp(at, time, front[0])), known, tolerance, source)
 
     def _impulses(self, run: Record) -> Iterator[Measure]:
         """Yield the impulse at each sensor over the windows that the run covers."""
@@ -248,7 +290,11 @@ class DamBreak(FreeSurface):
         clock = "$t\\sqrt{g/H}$"
         time, front = Front.read(run)
         known = tuple(reference.table("dam_break_front.csv")) if self._is_compared else nothing
-        drawn = [Profile("front", (clock, "front $x/H$"), (time, front[0]), known, "TrixiParticles, H/Δx = 400")]
+        axes = clock, "front $x/H$"
+        drawn = [Profile("front", axes, (time, front[0]), known, COMPUTATION)]
+        for column in COLUMNS.get(self.length, ()):
+            source = f"experiment, {column.source}"
+            drawn.append(Profile(f"front, {column.source}", axes, (time, front[0]), column.measured(), source))
         time, pressure = Sensors.read(run)
         for (name, sensor), own in zip(SENSORS.items(), pressure, strict=False):
             known, axes = sensor.measured() if self._is_compared else nothing, (clock, "$p\\,/\\,\\rho gH$")

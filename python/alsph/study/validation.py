@@ -111,6 +111,8 @@ FULL = (
     Entry("concentric_release", (10, 20, 40), until=0.11, parameters={"density_ratio": 2.0}),
     Entry("oscillating_cylinder", (10, 20), until=15.0),
     Entry("dam_break", (20, 40, 80), until=2.0),
+    Entry("dam_break", (20, 40), until=2.0, parameters={"length": 0.5}),
+    Entry("dam_break", (20, 40), until=2.0, parameters={"length": 1.0}),
     Entry("dam_break_obstacle", (20,), until=6.0),
     Entry("dam_break_structure", (30,), until=10.0),
     Entry("floating_box", (20, 40), until=8.0),
