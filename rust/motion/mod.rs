@@ -26,6 +26,7 @@
 //! Likewise rotation. Where c is given, as in weakly compressible schemes, M A^{n+1} = F^n does with ρ c S Δt < M/2.
 
 mod contact;
+mod limits;
 mod pose;
 
 pub use pose::{Following, NUMBERS, Pose};
@@ -45,13 +46,6 @@ const LAYER: f64 = 0.75;
 
 /// How far [Δx] from where its velocity takes it a body may be that a rule moves.
 const JUMP: f64 = 0.5;
-
-/// Up to which shares free bodies answer well: ρ c S Δt over M, where c is given; Δt over √(mass/stiffness) of a spring, as Ā needs some three
-/// hundred steps a period, and with fewer the fluid's answer adds energy (a tenth in three periods with sixty); Δt over mass/damping.
-pub const WELL: [f64; 3] = [0.5, 0.02, 0.5];
-
-/// The same, up to which nothing grows at once.
-pub const STABLY: [f64; 3] = [1.0, 1.0, 1.0];
 
 /// The poses of all bodies that a rule moves, in their order, at a time.
 pub type MotionRule = Box<dyn FnMut(f64) -> Result<Vec<Pose>> + Send + Sync>;
@@ -370,31 +364,6 @@ impl<const D: usize> Motion<D> {
                 body.start.follow(following);
             }
         }
-    }
-
-    /// Largest Δt with which free bodies answer so, by [`WELL`] or [`STABLY`].
-    pub fn response_limit(&self, settings: &Settings, [sounding, springing, damping]: [f64; 3]) -> f64 {
-        let speed = settings.sound_speed().unwrap_or(0.0);
-        let of = |body: &Moving<D>| {
-            let Some(rigid) = &body.rigid else { return f64::INFINITY };
-            let free = |of: &[f64]| {
-                of.iter().zip(&rigid.free).map(|(value, &free)| if free { *value } else { 0.0 }).fold(0.0, f64::max)
-            };
-            let moves = rigid.free[..D].contains(&true);
-            let sound = if moves { sounding * self.spacing / (speed * body.layer) } else { f64::INFINITY };
-            let spring = springing / (free(&rigid.stiffness) * rigid.mass).sqrt();
-            rigid.mass * sound.min(spring).min(damping / free(&rigid.damping))
-        };
-        self.bodies.iter().map(of).fold(f64::INFINITY, f64::min)
-    }
-
-    /// The largest acceleration of a body's surface at the start of the step.
-    pub fn acceleration(&self) -> f64 {
-        let of = |body: &Moving<D>| {
-            let Pose { acceleration, angular_acceleration, spin, .. } = body.start;
-            acceleration.norm() + (angular_acceleration.norm() + spin.norm_squared()) * body.radius
-        };
-        self.bodies.iter().map(of).fold(0.0, f64::max)
     }
 }
 
