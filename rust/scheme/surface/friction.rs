@@ -7,6 +7,9 @@ use crate::discretisation::{AdjointGradient, Roughness};
 use crate::flow::{Flow, Step};
 use crate::settings::FreeSurface;
 
+/// Of the support, within which a particle that sees air makes its neighbours take what it gives.
+const WITHIN: f64 = 1.0 - 1e-4;
+
 impl<const D: usize> Terms<D> {
     /// All of it, from u^n and ∇u^n in `tensor`, and the pressure of the surface.
     pub(super) fn find_friction(&mut self, step: Step, flow: &Flow<D>) {
@@ -68,10 +71,12 @@ impl<const D: usize> Terms<D> {
             *flag = f64::from(u8::from(surface.place[i].sees_air()))
         });
         frame.images.fill(&mut self.pushed);
-        let sees_air = &self.pushed;
+        // Of a lattice's neighbours at the very edge of the support, which take nothing, rounding would decide.
+        let (sees_air, reach) = (&self.pushed, WITHIN * step.settings.support_radius());
         let is_beside_air = |i: usize| {
-            let (row, lane) = frame.stencil.neighbours.row(i);
-            sees_air[i] > 0.0 || row.all().iter().any(|entry| entry.slopes[lane] != 0.0 && sees_air[entry.j()] > 0.0)
+            let (row, position) = (frame.stencil.neighbours.row(i).0, &frame.stencil.position);
+            let beside = |j: usize| sees_air[j] > 0.0 && (position[j] - position[i]).norm() < reach;
+            sees_air[i] > 0.0 || row.all().iter().any(|entry| beside(entry.j()))
         };
         frame.stencil.for_each_one(
             AdjointGradient { tensor: &self.tensor, own: |_| 1.0 },
