@@ -546,6 +546,13 @@ def test_a_dam_breaks_between_solids_as_between_slip_walls(scheme, seed):
     assert rows["fluid"][-1] >= 0.99 * rows["fluid"][0]
 
 
+def test_a_layer_of_water_in_whole_spacings_is_told():
+    assert not cases.DamBreakStructure().remarks() and not cases.DamBreakStructure(resolution=8, bed=0).remarks()
+    for resolution, wet in ((8, "0"), (20, "0.05")):
+        (remark,) = cases.DamBreakStructure(resolution=resolution).remarks()
+        assert f"floor is {wet} H deep" in remark and "resolution = 30" in remark
+
+
 @pytest.mark.parametrize(("length", "sources"), [(1.0, 1), (0.5, 2)])
 def test_columns_of_other_lengths_stand_beside_their_experiments(length, sources, tmp_path):
     """They lead by some per cent, and the measured curves begin at the column's end."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar
 
 import numpy as np
@@ -123,6 +124,14 @@ class DamBreakStructure(Obstacle):
     def wet(self) -> float:
         """Depth of the water that lies on the floor in front of the column [H]."""
         return self.bed
+
+    def remarks(self) -> list[str]:
+        """Return what this resolution cannot carry, a layer of water that is thinner than told among it."""
+        found, wet = super().remarks(), float(self.whole(self.wet))
+        if abs(wet - self.bed) > 0.1 * self.bed:
+            told = f"layer: the water on the floor is {wet:.3g} H deep, in whole spacings, not {self.bed:.3g} H"
+            found.append(f"{told}; resolution = {math.ceil(1 / self.bed - 1e-9)} has it as one spacing")
+        return found
 
     def outputs(self) -> list[Output]:
         """Return the record of the velocity in front of the structure."""
