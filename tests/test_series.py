@@ -239,9 +239,18 @@ def test_a_sensor_that_the_water_has_not_met_is_not_drawn(tmp_path):
 
 
 def test_other_columns_and_tanks_have_no_experiment(tmp_path):
-    run = cases.DamBreak(resolution=8, length=1.0, tank_length=2.0).run(tmp_path / "run", until=4.0, progress=False)
+    run = cases.DamBreak(resolution=8, length=1.25, tank_length=2.5).run(tmp_path / "run", until=4.0, progress=False)
     assert [measure.name for measure in run.measures] == ["largest rise of the energy over its start"]
     assert all(not profile.reference[0].size for profile in run.profiles) and len(run.profiles) == 5
+
+
+def test_a_front_is_compared_before_it_meets_the_wall(tmp_path):
+    run = cases.DamBreak(resolution=8, length=1.0, tank_length=2.0).run(tmp_path / "run", until=2.5, progress=False)
+    assert [each.name[:24] for each in run.measures] == ["front at t = 1 beside Ma", "largest rise of the ener"]
+    (measured,) = (each.reference for each in run.profiles if each.name == "front, Martin and Moyce (1952)")
+    assert measured[1].max() < 2.0
+    narrow = cases.DamBreak(resolution=8, length=1.0, tank_length=1.05).run(tmp_path / "b", until=0.1, progress=False)
+    assert len(narrow.measures) == 1 and len(narrow.profiles) >= 2
 
 
 def test_probes_at_walls_do_not_read_below_the_air(tmp_path):

@@ -47,10 +47,10 @@ class Column(NamedTuple):
     curve: str
     scale: float
 
-    def measured(self) -> tuple[FloatArray, FloatArray]:
-        """Return time (n,) [√(H/g)] and front (n,) [H]."""
+    def measured(self, wall: float) -> tuple[FloatArray, FloatArray]:
+        """Return time (n,) [√(H/g)] and front (n,) [H] before it comes to a wall [H]."""
         time, front = self.scale * reference.table(f"dam_break_front_{self.curve}.csv")
-        return time, front
+        return time[front < wall], front[front < wall]
 
 
 COLUMNS = {
@@ -267,13 +267,13 @@ class DamBreak(FreeSurface):
         if not self._is_compared:
             rows = []
             for column in COLUMNS.get(self.length, ()):
-                curve, source = column.measured(), f"experiment, {column.source}"
-                for at in (at for at in FRONT if at <= curve[0][-1]):
+                curve, source = column.measured(self.end), f"experiment, {column.source}"
+                for at in (at for at in FRONT if len(curve[0]) and at <= curve[0][-1]):
                     name = f"front at t = {at:g} beside {column.source}, H"
                     rows.append((at, name, float(np.interp(at, *curve)), source, 0.15))
         for at, name, known, source, tolerance in rows:
-            if len(time) and time[0] <= at <= time[-1]:
-                yield Measure(name, float(np.interp(at, time, front[0])), known, tolerance, source)
+            if len(time) and time[0] <= at <= time[-1] and (own := float(np.interp(at, time, front[0]))) < self.end:
+                yield Measure(name, own, known, tolerance, source)
 
     def _impulses(self, run: Record) -> Iterator[Measure]:
         """Yield the impulse at each sensor over the windows that the run covers."""
@@ -294,7 +294,7 @@ class DamBreak(FreeSurface):
         drawn = [Profile("front", axes, (time, front[0]), known, COMPUTATION)]
         for column in COLUMNS.get(self.length, ()):
             source = f"experiment, {column.source}"
-            drawn.append(Profile(f"front, {column.source}", axes, (time, front[0]), column.measured(), source))
+            drawn.append(Profile(f"front, {column.source}", axes, (time, front[0]), column.measured(self.end), source))
         time, pressure = Sensors.read(run)
         for (name, sensor), own in zip(SENSORS.items(), pressure, strict=False):
             known, axes = sensor.measured() if self._is_compared else nothing, (clock, "$p\\,/\\,\\rho gH$")
