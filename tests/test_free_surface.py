@@ -546,6 +546,27 @@ def test_a_dam_breaks_between_solids_as_between_slip_walls(scheme, seed):
     assert rows["fluid"][-1] >= 0.99 * rows["fluid"][0]
 
 
+def test_the_force_on_a_structure_is_of_both_halves_and_counts_from_the_water_on():
+    time = np.arange(1, 1201) * 0.01
+
+    class Record:
+        path = Path("nowhere")
+        history = {
+            "time": time,
+            "time_step": np.full(len(time), 0.01),
+            "structure_pressure_force_x": np.where(time > 1, 0.05, 0.0),
+            "structure_viscous_force_x": np.zeros(len(time)),
+            "kinetic_energy": np.ones(len(time)),
+        }
+
+    found = {each.name[:45]: each for each in cases.DamBreakStructure().measures(Record)}
+    forces = [each for name, each in found.items() if name.startswith("force")]
+    assert [each.value for each in forces] == pytest.approx([0.1] * 3)
+    assert [each.reference for each in forces] == pytest.approx([0.0704, 0.0527, -0.0332], abs=1e-4)
+    coarse = cases.DamBreakStructure(resolution=8).measures(Record)  # has no layer, which the experiment had
+    assert np.isnan([each.reference for each in coarse]).all()
+
+
 def test_a_layer_of_water_in_whole_spacings_is_told():
     assert not cases.DamBreakStructure().remarks() and not cases.DamBreakStructure(resolution=8, bed=0).remarks()
     for resolution, wet in ((8, "0"), (20, "0.05")):

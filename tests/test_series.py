@@ -249,6 +249,10 @@ def test_a_front_is_compared_before_it_meets_the_wall(tmp_path):
     assert [each.name[:24] for each in run.measures] == ["front at t = 1 beside Ma", "largest rise of the ener"]
     (measured,) = (each.reference for each in run.profiles if each.name == "front, Martin and Moyce (1952)")
     assert measured[1].max() < 2.0
+    at_wall = cases.DamBreak(resolution=20, length=0.5, tank_length=2.475).run(
+        tmp_path / "w", until=2.1, progress=False
+    )
+    assert not any(each.name.startswith("front at t = 2") for each in at_wall.measures)
     narrow = cases.DamBreak(resolution=8, length=1.0, tank_length=1.05).run(tmp_path / "b", until=0.1, progress=False)
     assert len(narrow.measures) == 1 and len(narrow.profiles) >= 2
 

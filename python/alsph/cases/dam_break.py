@@ -237,7 +237,11 @@ class DamBreak(FreeSurface):
     def outputs(self) -> list[Output]:
         """Return the records of the front and of the sensors in the end wall."""
         if self.walls == "solid":
-            points = {name: (np.array([self.end, each.height]), np.array([-1.0, 0])) for name, each in SENSORS.items()}
+            points = {
+                name: (np.array([self.end, each.height]), np.array([-1.0, 0]))
+                for name, each in SENSORS.items()
+                if each.diameter < 0.1  # solids tell of points
+            }
             return [Front(self), WallSensors(points, 0, np.zeros(2), self.particle_spacing)]
         places = {name: self.disc(sensor.height, sensor.diameter) for name, sensor in SENSORS.items()}
         return [Front(self), Sensors(places, self.particle_spacing)]
@@ -271,8 +275,9 @@ class DamBreak(FreeSurface):
                 for at in (at for at in FRONT if len(curve[0]) and at <= curve[0][-1]):
                     name = f"front at t = {at:g} beside {column.source}, H"
                     rows.append((at, name, float(np.interp(at, *curve)), source, 0.15))
+        near = self.end - 2 * self.particle_spacing  # the foremost particles stop short of the wall
         for at, name, known, source, tolerance in rows:
-            if len(time) and time[0] <= at <= time[-1] and (own := float(np.interp(at, time, front[0]))) < self.end:
+            if len(time) and time[0] <= at <= time[-1] and (own := float(np.interp(at, time, front[0]))) < near:
                 yield Measure(name, own, known, tolerance, source)
 
     def _impulses(self, run: Record) -> Iterator[Measure]:

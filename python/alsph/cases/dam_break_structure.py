@@ -130,7 +130,9 @@ class DamBreakStructure(Obstacle):
         found, wet = super().remarks(), float(self.whole(self.wet))
         if abs(wet - self.bed) > 0.1 * self.bed:
             told = f"layer: the water on the floor is {wet:.3g} H deep, in whole spacings, not {self.bed:.3g} H"
-            found.append(f"{told}; resolution = {math.ceil(1 / self.bed - 1e-9)} has it as one spacing")
+            found.append(
+                f"{told}; multiples of resolution = {math.ceil(1 / self.bed - 1e-9)} have it so, bed = 0 has none"
+            )
         return found
 
     def outputs(self) -> list[Output]:
@@ -139,7 +141,8 @@ class DamBreakStructure(Obstacle):
 
     @property
     def _is_the_experiment(self) -> bool:
-        return bool(self.bed == type(self).model_fields["bed"].default)
+        told = float(type(self).model_fields["bed"].default)
+        return math.isclose(self.bed, told, rel_tol=1e-3) and abs(float(self.whole(self.bed)) - told) < told
 
     def measures(self, run: Record) -> list[Measure]:
         """Return mean velocities and forces after the water has come beside the experiment, and what energy was made.
