@@ -18,7 +18,7 @@ from alsph.errors import ConfigError
 from alsph.folder.run_folder import OWN
 from alsph.geometry.lattice import cell_centres, lattice
 from alsph.geometry.particles import join
-from alsph.geometry.solids import body_layers, walls
+from alsph.geometry.solids import body_layers, open_tank
 from alsph.results import outcome
 from alsph.study.results import names
 from alsph.watching.watched import Watched
@@ -489,8 +489,7 @@ class Tank(cases.FreeSurface):
         water = lattice(
             cell_centres(self.whole_cells("column", self.column), spacing), cell_centres(self.resolution, spacing)
         )
-        solid = walls(shapely.box(0, 0, self.length, 3), spacing, self.support_layers)
-        solid = solid.where(solid.position[:, 1] < 2)
+        solid = open_tank(0, self.length, 2, spacing, self.support_layers)
         return join(self.fluid(water, np.zeros_like(water), 1 - water[:, 1]), solid.particles())
 
 

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
@@ -25,7 +24,7 @@ from alsph.errors import ConfigError
 from alsph.geometry.domain import Boundary, Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, lattice
 from alsph.geometry.particles import Kind, join
-from alsph.geometry.solids import Solid, walls
+from alsph.geometry.solids import Solid, open_tank
 
 FRONT = {1.0: 2.947, 2.0: 4.665}
 """Front [H] at times [√(H/g)] of a column 2H long: WCSPH with 400 particles over H, the authors' own
@@ -88,9 +87,8 @@ class Sensor(NamedTuple):
 
     def measured(self) -> tuple[FloatArray, FloatArray]:
         """Return time (n,) [√(H/g)] and pressure (n,) [ρgH]."""
-        time, pressure = reference.table(f"dam_break_pressure_{self.curve}.csv")
-        order = np.argsort(time, kind="stable")  # digitised points turn back at the impact
-        return time[order], pressure[order]
+        time, pressure = reference.curve(f"dam_break_pressure_{self.curve}.csv")
+        return time, pressure
 
 
 LOBOVSKY, BUCHNER = "experiment, Lobovský et al. (2014)", "experiment, Buchner (2002)"
@@ -198,7 +196,7 @@ class DamBreak(FreeSurface):
     @property
     def coefficient_bodies(self) -> list[str]:
         """Name of the tank, where it is of solids."""
-        return ["tank"] if self.walls == "solid" else []
+        return [body.name for body in self.bodies()]
 
     @property
     def middle(self) -> FloatArray:
@@ -223,8 +221,7 @@ class DamBreak(FreeSurface):
 
     @cached_property
     def _tank(self) -> Solid:
-        tank = walls(shapely.box(0, 0, self.end, self.tank_height + 1), self.particle_spacing, self.support_layers)
-        return tank.where(tank.position[:, 1] < self.tank_height)
+        return open_tank(0, self.end, self.tank_height, self.particle_spacing, self.support_layers)
 
     def particle_estimate(self) -> int:
         """Return about how many particles there are, with those of the walls."""

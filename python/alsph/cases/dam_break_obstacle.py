@@ -10,7 +10,7 @@ from alsph import reference
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
-from alsph.cases.obstacle import Obstacle
+from alsph.cases.obstacle import Obstacle, mean_between
 from alsph.cases.sensors import WallSensors
 from alsph.engine.output import Output
 
@@ -77,7 +77,7 @@ class DamBreakObstacle(Obstacle):
                 rows.append(Measure(f"time of arrival at {name}, √(H/g)", found[0], found[1], 0.05, SOURCE))
             for start, end in WINDOWS:
                 if len(time) and time[-1] >= end:
-                    means = [_mean(time, own, start, end), _mean(at, measured, start, end)]
+                    means = [mean_between(time, own, start, end), mean_between(at, measured, start, end)]
                     label = mean_name(name, (start, end))
                     rows.append(Measure(label, means[0], means[1], 0.15, SOURCE))
         return rows
@@ -97,7 +97,3 @@ def _arrival(time: FloatArray, pressure: FloatArray) -> float:
     """Return when a pressure first exceeds 0.3."""
     above = np.flatnonzero(pressure > 0.3)
     return float(time[above[0]]) if len(above) else np.nan
-
-
-def _mean(time: FloatArray, pressure: FloatArray, start: float, end: float) -> float:
-    return float(np.interp(np.linspace(start, end, 1001), time, pressure).mean())

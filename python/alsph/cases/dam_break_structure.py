@@ -14,7 +14,7 @@ from alsph.analysis.record import Record
 from alsph.analysis.sampling import average
 from alsph.arrays import FloatArray
 from alsph.cases.free_surface import GRAVITY
-from alsph.cases.obstacle import Obstacle
+from alsph.cases.obstacle import Obstacle, mean_between
 from alsph.cases.series import Series
 from alsph.engine.output import Output
 from alsph.engine.simulation import Simulation
@@ -156,8 +156,8 @@ class DamBreakStructure(Obstacle):
         ):
             for window in windows:
                 if len(own[0]) and own[0][-1] >= window[1]:
-                    known = _mean(*measured, window) if self._is_the_experiment else np.nan
-                    rows.append(Measure(name(window), _mean(*own, window), known, 0.15, SOURCE))
+                    known = mean_between(*measured, *window) if self._is_the_experiment else np.nan
+                    rows.append(Measure(name(window), mean_between(*own, *window), known, 0.15, SOURCE))
         return [*rows, *self.energy_measures(run)]
 
     def profiles(self, run: Record) -> list[Profile]:
@@ -199,13 +199,8 @@ def _since(time: FloatArray, values: FloatArray, threshold: float) -> tuple[Floa
 
 def _measured(name: str) -> tuple[FloatArray, FloatArray]:
     """Return time since the water has come and velocity or force of the experiment."""
-    time, value = reference.table(f"dam_break_structure_{name}.csv")
-    order = np.argsort(time, kind="stable")  # digitised points turn back
-    time, value = time[order] * SECOND, value[order]
+    time, value = reference.curve(f"dam_break_structure_{name}.csv")
+    time = time * SECOND
     if name == "force":
         return _since(time, value * NEWTON, PUSHES)
     return time, value * METRE_PER_SECOND  # its clock begins then
-
-
-def _mean(time: FloatArray, value: FloatArray, window: tuple[float, float]) -> float:
-    return float(np.interp(np.linspace(*window, 1001), time, value).mean())

@@ -66,24 +66,20 @@ class FloatingBox(FreeSurface):
         self.whole_cells("tank_length", self.tank_length)
         return self
 
-    def _whole(self, length: float, count: int = 1) -> float:
-        """Return a length to a whole number of so many spacings [H]."""
-        return count * round(length / count * self.resolution) / self.resolution
-
     @property
     def _whole_lift(self) -> float:
         """The lift, to whole spacings [H]."""
-        return self._whole(self.lift)
+        return float(self.whole(self.lift))
 
     @property
     def size(self) -> tuple[float, float]:
         """Length and height of the box, to whole spacings [H]."""
-        return self._whole(self.box_length, 2), self._whole(self.box_height)
+        return float(self.whole(self.box_length, 2)), float(self.whole(self.box_height))
 
     @property
     def draught(self) -> float:
         """Depth that the box is immersed to at rest, to whole spacings [H]."""
-        return self._whole(self.density_ratio * self.size[1])
+        return float(self.whole(self.density_ratio * self.size[1]))
 
     @property
     def default_until(self) -> float:

@@ -111,3 +111,8 @@ class Obstacle(FreeSurface):
         size = np.linalg.norm(normal, axis=1, keepdims=True)
         kept = least < self.support_layers * self.particle_spacing
         return Solid(position, np.divide(normal, size, out=np.zeros_like(normal), where=size > 0), least).where(kept)
+
+
+def mean_between(time: FloatArray, value: FloatArray, start: float, end: float) -> float:
+    """Return the mean of a curve, values (n,) at times (n,), between two times."""
+    return float(np.interp(np.linspace(start, end, 1001), time, value).mean())

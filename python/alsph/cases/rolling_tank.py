@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import numpy as np
-import shapely
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
@@ -19,7 +18,7 @@ from alsph.engine.output import Output
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, lattice
 from alsph.geometry.particles import join
-from alsph.geometry.solids import walls
+from alsph.geometry.solids import open_tank
 
 DEPTH = 0.465
 """H of the experiment, three quarters of a tank 0.92 m long and 0.62 m high [m]."""
@@ -70,8 +69,7 @@ class RollingTank(FreeSurface):
     @property
     def size(self) -> tuple[float, float]:
         """Length and height of the tank, to whole spacings [H]."""
-        columns = 2 * round(self.tank_length * self.resolution / 2)
-        return columns / self.resolution, round(self.tank_height * self.resolution) / self.resolution
+        return float(self.whole(self.tank_length, 2)), float(self.whole(self.tank_height))
 
     def domain(self) -> Domain:
         """Return a box around the tank as it rolls."""
@@ -107,8 +105,7 @@ class RollingTank(FreeSurface):
         (length, height), spacing = self.size, self.particle_spacing
         columns = cell_centres(round(length * self.resolution), spacing) - length / 2
         position = lattice(columns, cell_centres(self.resolution, spacing))
-        tank = walls(shapely.box(-length / 2, 0, length / 2, height + 1), spacing, self.support_layers)
-        tank = tank.where(tank.position[:, 1] < height)
+        tank = open_tank(-length / 2, length / 2, height, spacing, self.support_layers)
         water = self.fluid(position, np.zeros_like(position), 1 - position[:, 1])
         return join(water, tank.particles())
 

@@ -83,6 +83,12 @@ def walls(region: Polygon, spacing: float, layers: int) -> Solid:
     return facing(points[(distance > 0) & (distance < layers * spacing)], region, spacing)
 
 
+def open_tank(left: float, right: float, height: float, spacing: float, layers: int) -> Solid:
+    """Place solid particles around a tank from `left` to `right` with its floor at y = 0, open at the top."""
+    tank = walls(shapely.box(left, 0, right, height + 1), spacing, layers)
+    return tank.where(tank.position[:, 1] < height)
+
+
 ROOM = 0.75
 """A solid particle is put where the nearest one is farther than this [Δx]."""
 

@@ -70,6 +70,12 @@ def table(name: str) -> FloatArray:
     return np.loadtxt(FOLDER / name, delimiter=",", skiprows=1, unpack=True)
 
 
+def curve(name: str) -> FloatArray:
+    """Return the columns (k, n) of such a file in the order of the first: digitised points turn back in time."""
+    columns = table(name)
+    return np.asarray(columns[:, np.argsort(columns[0], kind="stable")])
+
+
 def _results(name: str, reynolds: float) -> dict[str, float] | None:
     """Return the values in the row of a Reynolds number, None where there is no such row."""
     known = row(name, reynolds)
