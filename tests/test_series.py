@@ -1,6 +1,7 @@
 """What runs with a free surface record in small CSV files: levels, front and sensors."""
 
 from dataclasses import fields
+from functools import partial
 
 import alsph
 import numpy as np
@@ -10,6 +11,7 @@ from alsph.analysis import sampling
 from alsph.analysis.sampling import pressure_on_walls
 from alsph.cases.dam_break import SENSORS, WINDOWS, Front, impulse_name
 from alsph.cases.free_surface import Levels, Sensors
+from alsph.cases.sensors import WallSensors, _fitted
 from alsph.cases.series import Series
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError
@@ -162,6 +164,26 @@ def test_a_sensor_in_a_tank_that_sways_feels_what_pushes_the_water():
     at = np.array([[0.0, 0.3], [0.0, 0.32]])
     (found,) = Sensors({"one": at}, SPACING).values(simulation)
     assert abs(push[0]) > 0.5 and found == pytest.approx(3 - 0.31, abs=1e-9)
+
+
+@pytest.mark.parametrize("resolution", [14, 20, 33])
+@pytest.mark.parametrize("made", [cases.DamBreakObstacle, cases.RollingTank, partial(cases.DamBreak, walls="solid")])
+def test_sensors_in_walls_of_solids_fit_what_these_show(made, resolution):
+    """A pressure that is linear along the wall, at all heights and with however many spacings below an edge."""
+    case = made(resolution=resolution)
+    simulation, (*_, sensors) = case.simulation(threads=1), case.outputs()
+    assert isinstance(sensors, WallSensors)
+    state = simulation.state()
+    slope = np.array([0, 0.7, 0.4])[: case.space_dimensions]
+    simulation.restore(state | {"pressure": 3 - state["position"] @ slope})
+    assert sensors.values(simulation) == pytest.approx(3 - sensors.points @ slope, abs=1e-9)
+    simulation.restore(state | {"pressure": 0 * state["pressure"]})
+    assert (sensors.values(simulation) == 0).all()
+
+
+def test_a_sensor_above_a_single_row_feels_that_row():
+    found = _fitted(np.array([[0, -1.9], [1, -1.9]]), np.array([1.0, 2.0]))
+    assert found == pytest.approx(1.0) and _fitted(np.array([[0.5, 0], [1.0, 0]]), np.array([1.0, 3.0])) == 0
 
 
 def test_discs_are_of_their_size():

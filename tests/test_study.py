@@ -117,6 +117,25 @@ def test_files_that_cannot_be_used_are_refused_with_their_name(tmp_path):
         study.load("reynolds", "fast")
 
 
+def test_runs_that_start_with_the_flow_of_another_are_known_by_it():
+    """Starts are shared where nothing that is left of the point's own parameters differs."""
+    plain = declare().points()
+    shared = declare(start={"resolution": 8, "reynolds": 70, "run": {"until": 0.1}}).points()
+    own = declare(start={"resolution": 8}).points()
+    assert len({point.name for point in [*plain, *shared, *own]}) == 6
+    assert {point.start.name for point in shared} == {shared[0].start.name}
+    assert shared[0].start.label == "start.resolution 8, start.reynolds 70, start.run.until 0.1"
+    assert shared[0].start.config.until == 0.1 and shared[0].config == plain[0].config
+    assert [point.start.config.case.reynolds for point in own] == [50, 100]
+    assert [point.start.config.until for point in own] == [0.2, 0.2]
+    with pytest.raises(ValueError, match="start: base.run has an initial_run; give one of them"):
+        declare(base=VORTEX | {"run": {"initial_run": "x"}}, start={"resolution": 8})
+    with pytest.raises(ConfigError, match="start: still_water has a free surface"):
+        declare(base={"case": "still_water"}, start={"resolution": 8}).points()
+    with pytest.raises(ConfigError, match="resolutio: unknown parameter; did you mean 'resolution'"):
+        declare(start={"resolutio": 8}).points()
+
+
 @pytest.mark.parametrize("name", study.shipped())
 def test_the_studies_of_the_paper_declare_its_runs(name):
     for preset in ("quick", "paper"):
@@ -125,6 +144,8 @@ def test_the_studies_of_the_paper_declare_its_runs(name):
         assert len({point.name for point in points}) == len(points)
         assert {point.config.case.algorithm for point in points} == {1, 2}
         assert all(point.config.case.projection_sweeps == 0 for point in points)
+    starts = {point.start.name: point.start.config.case for point in points}
+    assert len(starts) == len({case.reynolds for case in starts.values()}) <= 5
     assert declared.points()[-1].config.case.resolution == 30
     assert {figure.name for figure in declared.figures} == {
         "time-step": {"figure_3", "figure_4", "figure_5"},
@@ -163,6 +184,34 @@ def test_a_study_asked_for_again_runs_only_what_is_missing_and_shares_runs(done)
     after = {path: (path / "run.json").stat().st_mtime_ns for path in (output / RUNS).iterdir()}
     assert len(after) == 3 and all(after[path] == before[path] for path in before)
     assert results.rows[0] == done.rows[1]
+
+
+def test_runs_start_with_the_flow_of_one_that_is_made_first(tmp_path):
+    declared = declare(start={"resolution": 8, "reynolds": 70})
+    start = declared.points()[0].start.name
+    results = study.run(declared, tmp_path, progress=False)
+    folders = [tmp_path / RUNS / point.name for point in declared.points()]
+    assert results.complete and len(results.rows) == 2 and len(list((tmp_path / RUNS).iterdir())) == 3
+    for folder, reynolds in zip(folders, (50, 100), strict=True):
+        by_hand = TaylorGreen(resolution=16, reynolds=reynolds).run(
+            tmp_path / f"{reynolds}",
+            until=0.2,
+            output_interval=0.1,
+            threads=1,
+            initial_run=str(tmp_path / RUNS / start),
+            progress=False,
+        )
+        assert bits(folder) == bits(by_hand.path)
+    (tmp_path / RUNS / start).rename(tmp_path / "gone")  # what has ended needs it no longer
+    assert study.run(declared, tmp_path, progress=False).rows == results.rows
+    assert not (tmp_path / RUNS / start).exists()
+
+
+def test_what_would_start_with_a_flow_that_diverged_is_skipped(tmp_path):
+    base = VORTEX | {"adaptive_time_step": False, "penalty_constant": 100.0}
+    results = study.run(declare(base=base, start={"time_step": 0.5}), tmp_path, progress=False)
+    assert [row["status"] for row in results.rows] == ["skipped", "skipped"]
+    assert len(list((tmp_path / RUNS).iterdir())) == 2
 
 
 def test_misspelt_results_are_warned_of_and_lose_nothing(done):

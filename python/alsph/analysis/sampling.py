@@ -33,7 +33,7 @@ def _nearest(
 
 
 def average(position: FloatArray, values: FloatArray, points: FloatArray, spacing: float) -> FloatArray:
-    """Gaussian means (m,) of a particle field `values` (n,) at points (m, d): smooth, for pictures.
+    """Gaussian means (m,) of a particle field `values` (n,) at points (m, d): smooth, for pictures and gauges.
 
     NaN where the nearest particle is further away than 1.5 Δx.
     """

@@ -130,6 +130,11 @@ class Case(Driven):
         """What force coefficients are formed with: a length in 2-D [D], an area in 3-D [D²]."""
         return 1.0
 
+    @property
+    def computed_share(self) -> float:
+        """Share of the bodies that is computed, whose forces are recorded; the rest are its mirror images."""
+        return 1.0
+
     @abstractmethod
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return the particles at the start."""

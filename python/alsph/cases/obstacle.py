@@ -73,6 +73,11 @@ class Obstacle(FreeSurface):
         return [self.obstacle]
 
     @property
+    def computed_share(self) -> float:
+        """Share of the box that is computed."""
+        return 0.5
+
+    @property
     def initial_volume(self) -> float:
         """That of half of the water [H³]."""
         return float(self.tank[1] * (self.column + (self.tank[0] - self.column) * self.whole(self.wet)))

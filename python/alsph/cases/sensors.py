@@ -11,17 +11,18 @@ from alsph.cases.series import Series
 from alsph.engine.simulation import Simulation
 from alsph.geometry.particles import Kind
 
-NEAR = 1.01
-"""Distance [Δx] of the solid particles from a sensor whose pressures it feels."""
+NEAR = 2.0
+"""Distance along the wall [Δx] of the solid particles from a sensor whose pressures it feels."""
 
-ALIKE = 0.9
-"""Least product of their normals and the sensor's."""
+ALIKE = 0.7
+"""Least product of their normals and the sensor's: those of edges, whose normal is the bisector, are among them."""
 
 
 class WallSensors(Series):
     """The pressure at sensors in a wall of solid particles over time, in a file of the run folder; they go with it.
 
-    It is the mean of what the solid particles nearby show: that of the fluid around, continued to them.
+    It is what the first row of solid particles nearby shows, that of the fluid around continued to them: a linear fit
+    along the wall.
 
     Parameters
     ----------
@@ -58,6 +59,21 @@ class WallSensors(Series):
         place, outward, pressure = (state[name][solid] for name in ("position", "normal", "pressure"))
         found = []
         for point, normal in zip(points, normals, strict=True):
-            near = (np.linalg.norm(place - point, axis=1) < NEAR * self.spacing) & (outward @ normal > ALIKE)
-            found.append(pressure[near].mean() if near.any() else np.nan)
+            away = (place - point) / self.spacing
+            into = away @ normal
+            along = away - into[:, None] * normal
+            near = (np.abs(into) < 1) & (np.linalg.norm(along, axis=1) < NEAR) & (outward @ normal > ALIKE)
+            found.append(_fitted(along[near], pressure[near]) if near.any() else np.nan)
         return np.array(found)
+
+
+def _fitted(away: FloatArray, pressure: FloatArray) -> float:
+    """Return the value at 0 of a linear fit to pressures (n,) at places (n, d) [Δx]: the nearer the heavier.
+
+    Of the slopes that the places cannot tell it has none, and it is not below the air unless one of the pressures is.
+    """
+    weight = (1 - ((away / NEAR) ** 2).sum(axis=1)) ** 2
+    middle, mean = (np.average(each, axis=0, weights=weight) for each in (away, pressure))
+    root = np.sqrt(weight)
+    slope = np.linalg.lstsq(root[:, None] * (away - middle), root * (pressure - mean), rcond=1e-6)[0]
+    return float(max(mean - middle @ slope, min(pressure.min(), 0.0)))

@@ -81,6 +81,11 @@ class SettlingSphere(Case):
         return ["sphere"]
 
     @property
+    def computed_share(self) -> float:
+        """Share of the sphere that is computed."""
+        return 0.25
+
+    @property
     def centre(self) -> FloatArray:
         """Centre of the sphere at the start (3,) [D]."""
         return np.array([0.0, 0.0, self.height - END if self.sinks else END])
@@ -92,7 +97,7 @@ class SettlingSphere(Case):
 
     def bodies(self) -> list[SolidBody]:
         """Return the quarter of the sphere, which moves up and down alone."""
-        displaced = math.pi / 6 / 4
+        displaced = self.computed_share * math.pi / 6
         mass = self.density_ratio * displaced
         rigid = Rigid(
             mass,

@@ -73,11 +73,12 @@ class Spatial(Channel):
     @property
     def reference_area(self) -> float:
         """Frontal area, of the quarter if that is computed [D²]."""
-        return self._volume.frontal_area / self._share
+        return self._volume.frontal_area * self.computed_share
 
     @property
-    def _share(self) -> int:
-        return 4 if self.quarter else 1
+    def computed_share(self) -> float:
+        """Share of the body that is computed."""
+        return 0.25 if self.quarter else 1.0
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -131,7 +132,7 @@ class Spatial(Channel):
 
     def fluid_volume(self) -> float:
         """Return the volume of the channel without the body."""
-        return float(self.length * np.prod(self.section) - self._volume.volume) / self._share
+        return float(self.length * np.prod(self.section) - self._volume.volume) * self.computed_share
 
     def domain(self) -> Domain:
         """Return the channel, or its quarter."""

@@ -6,6 +6,7 @@ import inspect
 import re
 import types
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -101,7 +102,10 @@ def _renamed(parameter: inspect.Parameter, symbols: Symbols) -> inspect.Paramete
 
 
 def idle(model: type[cases.Case], case: cases.Case | None) -> set[str]:
-    """Return the options that have nothing to choose or to act on, in a case and, if it can be made, by default."""
+    """Return the options that have nothing to choose or to act on, in a case and, if it can be made, by default.
+
+    What acts with one of the choices of a parameter of the problem is not among them.
+    """
     choices = {name: _option_type(field.annotation)[1] for name, field in model.model_fields.items()}
     found = {*model.idle} | {name for name, few in choices.items() if len(few) == 1}
     found |= {name for name, schemes in OWN.items() if not {*schemes} & {*choices["scheme"]}}
@@ -110,19 +114,34 @@ def idle(model: type[cases.Case], case: cases.Case | None) -> set[str]:
     if choices["shifting"] == ("none",):
         found |= {"shift_coefficient", "shift_limit"}
     if case is not None:
-        bodies, domain = case.checked_bodies, case.checked_domain
-        acts = {
-            "wall_velocity": bodies,
-            "wall_pressure": bodies,
-            "body_motion": case.moved_bodies,
-            "surface_velocity": [body for body in bodies if not body.moves],
-            "inlet_velocity": [*domain.inlets()],
-            "surface_interval": case.surface_points(),
-            "initial_run": not domain.meets_air,
-            **dict.fromkeys(config.OF_CONVERGED, case.is_averaged),
-        }
-        found |= {name for name, on in acts.items() if not on}
+        found |= set.intersection(*map(_without_effect, _chosen(case)))
     return found
+
+
+def _chosen(case: cases.Case) -> Iterator[cases.Case]:
+    """Yield a case, and it with each other choice of a parameter of the problem that can be made alone."""
+    yield case
+    fields = type(case).model_fields
+    for name in fields.keys() - Method.model_fields.keys():
+        for choice in _option_type(fields[name].annotation)[1]:
+            with suppress(ConfigError):
+                yield case.replace(**{name: choice})
+
+
+def _without_effect(case: cases.Case) -> set[str]:
+    """Return the options that have nothing to act on in a case."""
+    bodies, domain = case.checked_bodies, case.checked_domain
+    acts = {
+        "wall_velocity": bodies,
+        "wall_pressure": bodies,
+        "body_motion": case.moved_bodies,
+        "surface_velocity": [body for body in bodies if not body.moves],
+        "inlet_velocity": [*domain.inlets()],
+        "surface_interval": case.surface_points(),
+        "initial_run": not domain.meets_air,
+        **dict.fromkeys(config.OF_CONVERGED, case.is_averaged),
+    }
+    return {name for name, on in acts.items() if not on}
 
 
 class CaseGroup(Group):
@@ -178,6 +197,7 @@ def _options(
     """Make an option of each named field of a model, hidden if it is `idle`; `until` is when a run of the case ends."""
     for name in names:
         kind, choices = _option_type(model.model_fields[name].annotation)
+        told = () if name == "until" and not _converges(idle) else choices
         flag = f"--{prefix}{name}".replace("_", "-")
         option = typer.Option(
             f"{flag}/--no-{flag[2:]}" if kind is bool else flag,
@@ -186,7 +206,7 @@ def _options(
             show_default=False,
             rich_help_panel=section,
             parser=number_of(kind, choices) if kind in WORDS else _choice_of(choices) if choices else None,
-            **(one_of(*choices, beside=METAVARS.get(kind, "")) if choices else {"metavar": METAVARS.get(kind)}),
+            **(one_of(*told, beside=METAVARS.get(kind, "")) if told else {"metavar": METAVARS.get(kind)}),
         )
         yield inspect.Parameter(
             prefix + name,
@@ -199,7 +219,12 @@ def _options(
 def _told(model: type[Parameters], name: str, idle: Collection[str]) -> str:
     """Return what is told of a parameter: of `until` only what the case can do."""
     text = model.describe(name)
-    return text.replace(config.OR_CONVERGED, "") if {*config.OF_CONVERGED} <= {*idle} else text
+    return text if _converges(idle) else text.replace(config.OR_CONVERGED, "")
+
+
+def _converges(idle: Collection[str]) -> bool:
+    """Whether runs of the case may end when their averages are known well enough."""
+    return not {*config.OF_CONVERGED} <= {*idle}
 
 
 def _default(model: type[Parameters], name: str, required: str) -> str:

@@ -184,15 +184,17 @@ def _drawings(run: "alsph.Run", bodies: list[str]) -> dict[str, Callable[[], Any
         profile.file_name: functools.partial(run.plot_profile, profile) for profile in run.profiles
     }
     drawings["ledger"] = run.plot_ledger
+    settles = run.config.case.settles
     if run.body:
-        drawings |= {"forces": run.plot_forces, "spectrum": run.plot_spectrum}
+        drawings |= {"forces": run.plot_forces} | ({"spectrum": run.plot_spectrum} if settles else {})
     if run.config.case.surface_points():
         drawings["pressure_coefficient"] = run.plot_pressure_coefficient
     for body in bodies:
         choose("body", body, run.bodies)
         name = "_".join(["of", *re.findall(r"\w+", body)])
         drawings[f"forces_{name}"] = functools.partial(run.plot_forces, body=body)
-        drawings[f"spectrum_{name}"] = functools.partial(run.plot_spectrum, body=body)
+        if settles:
+            drawings[f"spectrum_{name}"] = functools.partial(run.plot_spectrum, body=body)
         if body in run.config.case.surface_bodies and run.config.case.surface_points():
             drawings[f"pressure_coefficient_{name}"] = functools.partial(run.plot_pressure_coefficient, body=body)
     return drawings

@@ -129,9 +129,10 @@ def _print_results(results: "alsph.study.Results") -> None:
 def _print_states(declared: "alsph.study.Study", output: Path) -> None:
     from alsph.cases.remarks import keywords, tally
     from alsph.study.board import overview
+    from alsph.study.declaration import with_starts
 
     points = declared.points()
-    for line in overview(points, alsph.study.states(points, output)):
+    for line in overview(with_starts(points), alsph.study.states(points, output)):
         say(printable(line))
     if remarked := tally([keywords(point.config.case.remarks()) for point in points]):
         say(f"remarks: {remarked}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,8 +39,12 @@ def forces(run: Run, body: str | None = None) -> Figure:
         span = [run.window.start, run.window.end]
         upper.plot(span, [drag.mean] * 2, "k--", lw=1)
         upper.set_title(f"mean $C_D$ = {drag.mean}", loc="left", fontsize="medium")
-        strouhal = ",  no shedding found" if np.isnan(run.strouhal) else f",  Sr = {run.strouhal}"
+        strouhal = ""
+        if run.config.case.is_averaged:
+            strouhal = ",  no shedding found" if np.isnan(run.strouhal) else f",  Sr = {run.strouhal}"
         lower.set_title(f"rms $C_L$ = {lift.rms}{strouhal}", loc="left", fontsize="medium")
+    if (share := run.config.case.computed_share) < 1:
+        lower.set_title(f"of {Fraction(share)} of the body, which is computed", loc="right", fontsize="medium")
     lower.set_xlabel(TIME_LABEL)
     return figure
 

@@ -183,8 +183,10 @@ class Run(Loads):
             "averaged to tU/D": Estimate(self.window.end),
             "averaging rule": self.window.rule,
         }
-        if self.body:
+        if self.config.case.is_averaged:
             results["shedding periods"] = self.window.periods
+        if (share := self.config.case.computed_share) < 1:
+            results["share of the body that is computed"] = share
         results["mean velocity divergence, |∇·u| D/U"] = self.divergence.mean
         results["largest velocity divergence, |∇·u| D/U"] = self.divergence.max
         if np.isfinite(self.config.case.expected_penalty_constant()):

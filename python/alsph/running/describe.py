@@ -49,6 +49,7 @@ def describe(config: Config, *, probe: bool = True) -> list[tuple[str, str]]:
         ("particles", f"{kinds.sum():,}: {counts}"),
         ("memory", f"about {np.ceil(case.memory() / 2**20):,.0f} MiB, beside Python's own"),
         *((name, f"{value:.3g}") for name, value in case.scales().items()),
+        *((("forces", f"those on {case.computed_share:g} of the body"),) if case.computed_share < 1 else ()),
         ("time step", f"ΔtU/Δx = {step:.4g}" + (" (adaptive)" if case.adaptive_time_step else "")),
     ]
     if np.isfinite(constant):

@@ -3,7 +3,7 @@
 import hashlib
 import itertools
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
@@ -124,21 +124,33 @@ class Point:
         The case and the settings of its run.
     after : Point or None
         The run that must not have diverged for this one to be made.
+    start : Point or None
+        The run whose last flow this one starts with.
     """
 
     parameters: Mapping[str, Any]
     config: Config
     after: "Point | None" = None
+    start: "Point | None" = None
 
     @cached_property
     def name(self) -> str:
         """Name of the run's folder: the case and a hash of all that its result depends on."""
-        return f"{self.config.case.name}_{digest(self.config)[:12]}"
+        own = digest(self.config)
+        if self.start is not None:
+            own = hashlib.sha256(f"{own} {self.start.name}".encode()).hexdigest()
+        return f"{self.config.case.name}_{own[:12]}"
 
     @property
     def label(self) -> str:
         """The swept parameters in words."""
         return ", ".join(f"{name} {text(value)}" for name, value in self.parameters.items()) or self.config.case.name
+
+    def tables(self, runs: Path) -> dict[str, Any]:
+        """Return the tables of the configuration, `runs` being the folder of the study's run folders."""
+        tables = self.config.tables()
+        start = {"initial_run": str(runs / self.start.name)} if self.start else {}
+        return tables | {"run": tables["run"] | start}
 
 
 class Study(Parameters):
@@ -148,6 +160,10 @@ class Study(Parameters):
     title: str = Field(default="", description="what is studied")
     source: str = Field(default="", description="where it comes from")
     base: dict[str, Any] = Field(description="a case's configuration, as in its file: case, parameters, run")
+    start: dict[str, Any] = Field(
+        default={},
+        description="what is other in runs that are made before, with whose last flow the runs of the study start",
+    )
     sweep: Sweep = Field(default=Sweep(), description="the values that parameters take")
     collect: list[str] = Field(default=[], description="results to tabulate; all if none are given")
     figures: list[Figure] = Field(default=[], description="figures to draw")
@@ -160,6 +176,12 @@ class Study(Parameters):
             for name in filter(None, (figure.x, figure.finest, *figure.where)):
                 if name not in self.swept:
                     raise ValueError(f"figure {figure.name}: {name} is not swept; {suggest(name, self.swept)}")
+        return self
+
+    @model_validator(mode="after")
+    def _starts_once(self) -> Self:
+        if self.start and "initial_run" in self.base.get("run", {}):
+            raise ValueError("start: base.run has an initial_run; give one of them (that of the starts is start.run's)")
         return self
 
     @property
@@ -191,9 +213,20 @@ class Study(Parameters):
         for ladder in self.sweep.ladders():
             previous = None
             for parameters in ladder:
-                previous = Point(parameters, self._config(parameters), previous)
+                previous = Point(parameters, self._config(parameters), previous, self._start(parameters))
                 points.setdefault(previous.name, previous)
         return list(points.values())
+
+    def _start(self, parameters: Mapping[str, Any]) -> Point | None:
+        """Return the run that the one with these parameters starts with."""
+        if not self.start:
+            return None
+        other = _flat(self.start)
+        both = {name: value for name, value in parameters.items() if name not in other} | other
+        point = Point({f"start.{name}": value for name, value in both.items()}, self._config(both))
+        if point.config.case.checked_domain.meets_air:
+            raise ConfigError(f"study {self.name}: start: {point.config.name} has a free surface, which begins at rest")
+        return point
 
     def _config(self, parameters: Mapping[str, Any]) -> Config:
         tables = self.base | {"run": dict(self.base.get("run", {}))}
@@ -206,6 +239,12 @@ class Study(Parameters):
             return config.from_tables(tables, Path(self.folder))
         except ConfigError as error:
             raise ConfigError(f"study {self.name}, {dict(parameters)}: {error}") from None
+
+
+def with_starts(points: Sequence[Point]) -> list[Point]:
+    """Return the runs of a study, before them those that they start with, each once."""
+    starts = {point.start.name: point.start for point in points if point.start}
+    return list((starts | {point.name: point for point in points}).values())
 
 
 def digest(configuration: Config, *without: str) -> str:
@@ -275,13 +314,13 @@ def _parsed(tables: dict[str, Any], preset: str | None) -> Study:
 
 def _check_shape(tables: Mapping[str, Any]) -> None:
     """Check that what must be a table, or a list of tables, is one."""
-    single = {name: tables.get(name, {}) for name in ("base", "preset", "sweep")}
+    single = {name: tables.get(name, {}) for name in ("base", "preset", "start", "sweep")}
     for _ in range(2):  # the outer ones first
         for name, value in single.items():
             if not isinstance(value, dict):
                 raise ConfigError(f"{name} = {value!r}: must be a table, [{name}]")
         single |= {f"preset.{name}": value for name, value in single["preset"].items()}
-        single["base.run"] = single["base"].get("run", {})
+        single |= {f"{name}.run": single[name].get("run", {}) for name in ("base", "start")}
     for name in ("figure", "published"):
         entries = tables.get(name, [])
         if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
@@ -295,6 +334,12 @@ def _merged(tables: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
         both = isinstance(value, dict) and isinstance(merged.get(name), dict)
         merged[name] = _merged(merged[name], value) if both else value
     return merged
+
+
+def _flat(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the entries of a table with those of its table ``run`` as ``run.NAME``."""
+    own = {name: value for name, value in tables.items() if name != "run"}
+    return own | {f"run.{name}": value for name, value in tables.get("run", {}).items()}
 
 
 def text(value: Any) -> str:

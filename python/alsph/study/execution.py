@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 from alsph.errors import AlsphError, ConfigError, RunFolderError, WalltimeError
 from alsph.study.board import Board
-from alsph.study.declaration import Point, Study, load
+from alsph.study.declaration import Point, Study, load, with_starts
 from alsph.study.results import Results, check_names
 from alsph.study.state import ENDED, RUNS, State, states
 from alsph.study.worker import perform, stop_request
@@ -73,7 +73,9 @@ def run(
     study = study if isinstance(study, Study) else load(study, preset)
     output = Path(output)
     points = study.points()
-    if any(state.status not in ENDED for state in states(points, output).values()):  # else there is nothing to lose
+    found = states(points, output)
+    left = [point for point in points if found[point.name].status not in ENDED]
+    if left:  # else there is nothing to lose
         check_names(study, points)
     jobs = _jobs(jobs, threads) if scheduler is None else 0
     try:
@@ -82,8 +84,9 @@ def run(
         raise RunFolderError(f"{output}: cannot be created ({error.strerror})") from None
     pool = _LocalPool(jobs) if scheduler is None else _DaskPool(scheduler)
     failures = {}
-    with pool, Board(study, points, output, enabled=progress) as board:
-        failures = _Schedule(points, output.absolute(), threads, pool, board).work(deadline)
+    runs = list({point.name: point for point in [*with_starts(left), *points]}.values())
+    with pool, Board(study, runs, output, enabled=progress) as board:
+        failures = _Schedule(runs, output.absolute(), threads, pool, board).work(deadline)
     results = Results.of(study, points, output, failures)
     results.save()
     return results
@@ -210,9 +213,9 @@ class _Schedule:
                 continue
             if status == "running":  # another study makes it: wait for that
                 elsewhere = True
-            elif point.after is None or found[point.after.name].status == "finished":
-                config = point.config
-                tables = config.tables() | {"run": config.tables()["run"] | {"threads": self.threads}}
+            elif all(found[other.name].status == "finished" for other in (point.after, point.start) if other):
+                tables = point.tables(self.output / RUNS)
+                tables["run"] |= {"threads": self.threads}
                 self.futures[point.name] = self.pool.submit(tables, str(self._folder(point)))
         self.board.update(found)
         return bool(self.futures) or elsewhere

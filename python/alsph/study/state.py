@@ -7,7 +7,7 @@ from pathlib import Path
 
 from alsph.errors import RunFolderError
 from alsph.folder.run_folder import UNFINISHED, RunFolder
-from alsph.study.declaration import Point
+from alsph.study.declaration import Point, with_starts
 from alsph.text import printable
 
 ENDED = ("finished", "diverged", "skipped")
@@ -23,7 +23,7 @@ class State:
     ----------
     status : str
         ``waiting``, ``running``, ``stopped`` (goes on when the study is run again), ``finished``, ``diverged``,
-        ``failed``, or ``skipped`` because a run before it diverged.
+        ``failed``, or ``skipped`` because a run before it, or the one that it starts with, diverged.
     time : float
         Time reached [D/U].
     seconds : float
@@ -39,11 +39,15 @@ class State:
 
 
 def states(points: Sequence[Point], output: Path, failures: Mapping[str, str] | None = None) -> dict[str, State]:
-    """Return the states of runs by name, from the run folders in ``output/runs``; `failures` are messages by name."""
+    """Return the states of runs by name, from the run folders in ``output/runs``; `failures` are messages by name.
+
+    Those that runs start with are among them.
+    """
     found: dict[str, State] = {}
-    for point in points:
-        before = found[point.after.name].status if point.after else ""
-        found[point.name] = State("skipped") if before in ("diverged", "skipped") else state(output / RUNS / point.name)
+    for point in with_starts(points):
+        before = {found[other.name].status for other in (point.after, point.start) if other}
+        cut = before & {"diverged", "skipped"}
+        found[point.name] = State("skipped") if cut else state(output / RUNS / point.name)
     for name, message in (failures or {}).items():
         found[name] = replace(found[name], status="failed", message=message)
     return found
