@@ -160,6 +160,16 @@ pub fn follower(id: u64) -> u64 {
     id + (1 << LINEAGE_BITS)
 }
 
+/// Set in the ids of the particles that fill the buffers of outlets.
+const FILLS: u64 = 1 << (LINEAGE_BITS - 1);
+
+/// So many ids that none of the particles `ids` has, nor any that will follow an inlet particle.
+pub fn fresh_ids(ids: &[u64], count: usize) -> impl Iterator<Item = u64> + use<> {
+    let last = if count == 0 { None } else { ids.iter().filter(|&id| id & FILLS != 0).max() };
+    let next = last.map_or(0, |id| (id >> LINEAGE_BITS) + 1);
+    (0..count as u64).map(move |rank| (next << LINEAGE_BITS) | FILLS | rank)
+}
+
 /// Whether so many have followed each other that ids might run out.
 pub fn is_late(id: u64) -> bool {
     id >> LINEAGE_BITS >= MOST_FOLLOWERS

@@ -44,6 +44,8 @@ pub struct Report<const D: usize> {
     pub inlet_pressure: f64,
     /// Fluid, inlet, outlet, solid at the end of the step.
     pub counts: [usize; 4],
+    /// Particles that come back in the buffers of outlets.
+    pub returning: usize,
     /// Particles at a free surface, and those that are alone.
     pub places: [usize; 2],
     pub loads: Vec<Load<D>>,
@@ -105,6 +107,7 @@ pub fn columns<const D: usize>() -> Vec<(&'static str, Column<D>)> {
         (ParticleKind::NAMES[1], Count(|r| r.counts[1] as u64)),
         (ParticleKind::NAMES[2], Count(|r| r.counts[2] as u64)),
         (ParticleKind::NAMES[3], Count(|r| r.counts[3] as u64)),
+        ("returning", Count(|r| r.returning as u64)),
         ("surface", Count(|r| r.places[0] as u64)),
         ("isolated", Count(|r| r.places[1] as u64)),
         ("pressure_force", Force(|load| load.pressure_force)),
@@ -151,6 +154,7 @@ impl<const D: usize> Report<D> {
             dissipation: f64::NAN,
             inlet_pressure: inlet_pressure(step.settings, particles),
             counts: [0; 4],
+            returning: 0,
             places: [0; 2],
             loads,
             poses: Vec::new(),

@@ -684,7 +684,7 @@ fn each_particle_crosses_the_side_that_it_is_at() {
     ];
     let mut particles = common::particles(cases.iter().map(|case| Vector::from(case.0)).collect());
     particles.kind = cases.iter().map(|case| case.1).collect();
-    let flow = alsph::boundary::end_step(&mut particles, &settings, &alsph::neighbours::Grid::default());
+    let flow = alsph::boundary::end_step(&mut particles, &settings, &alsph::neighbours::Grid::default(), 0.01);
     for (id, (position, _, kind)) in cases.iter().enumerate() {
         let found = particles.id.iter().position(|&other| other == id as u64).map(|i| particles.kind[i]);
         assert_eq!(found, *kind, "at {position:?}");

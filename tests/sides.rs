@@ -1,6 +1,6 @@
 //! What happens at the sides of the domain, and the images beyond them.
 
-use alsph::boundary::{PressureRule, VelocityRule, conditions, end_step};
+use alsph::boundary::{MassFlow, PressureRule, VelocityRule, conditions, end_step};
 use alsph::halo::Images;
 use alsph::neighbours::Grid;
 use alsph::settings::WallPressure;
@@ -28,7 +28,8 @@ fn doubled(points: &[[f64; 2]]) -> Particles<2> {
 }
 
 fn ended(value: &Value, particles: &mut Particles<2>) {
-    end_step(particles, &common::parse(value), &Grid::default());
+    let settings = common::parse(value);
+    end_step(particles, &settings, &Grid::default(), 0.01);
 }
 
 #[test]
@@ -68,7 +69,7 @@ fn fluid_that_crosses_an_outlet_has_no_pressure_and_counts_as_mass() {
     particles.kind[2..4].fill(ParticleKind::Outlet);
     particles.kind[5..].fill(ParticleKind::Inlet);
     (0..8).for_each(|i| particles.pressure[i] = 1.0 + i as f64);
-    let flow = end_step(&mut particles, &settings, &Grid::default());
+    let flow = end_step(&mut particles, &settings, &Grid::default(), 0.01);
     let mass = 1.7 * SPACING * SPACING;
     assert_relative_eq!(flow.outflow, mass, epsilon = 1e-12);
     assert_relative_eq!(flow.inflow, 2.0 * mass, epsilon = 1e-12);
@@ -78,7 +79,7 @@ fn fluid_that_crosses_an_outlet_has_no_pressure_and_counts_as_mass() {
     // Without an outlet nothing leaves through it.
     let closed = common::parse(&box_between(json!([["inlet", "none"], ["slip", "slip"]])));
     let mut particles = common::particles(vec![Vector::from([1.01, 1.0])]);
-    assert_eq!(end_step(&mut particles, &closed, &Grid::default()).outflow, 0.0);
+    assert_eq!(end_step(&mut particles, &closed, &Grid::default(), 0.01).outflow, 0.0);
     assert_eq!(particles.kind, [ParticleKind::Fluid]);
 }
 
@@ -89,7 +90,7 @@ fn particles_go_at_the_end_of_the_outlets_buffer() {
     let end = 1.0 + settings.buffer_length();
     let mut particles = common::particles([end - 0.01, end + 0.01, end + 5.0].map(|x| Vector::from([x, 1.0])).to_vec());
     particles.kind.fill(ParticleKind::Outlet);
-    let flow = end_step(&mut particles, &settings, &Grid::default());
+    let flow = end_step(&mut particles, &settings, &Grid::default(), 0.01);
     assert_eq!((&particles.id[..], particles.real, flow.outflow), (&[0][..], 1, 0.0));
 }
 
@@ -108,7 +109,7 @@ fn a_refilled_particle_has_the_pressure_of_the_nearest_inlet_particle() {
     // The last was an image, and is gone.
     particles.real = 5;
     particles.drop_images();
-    end_step(&mut particles, &settings, &grid);
+    end_step(&mut particles, &settings, &grid, 0.01);
     assert_relative_eq!(particles.position[5], Vector::from([far, 1.0]), epsilon = 1e-12);
     assert_eq!(particles.pressure[5], 2.0);
 }
@@ -214,4 +215,88 @@ fn what_is_stale_is_made_nan_and_what_looks_fresh_is_found() {
     let found = std::panic::catch_unwind(|| images.check(&field));
     std::panic::set_hook(hook);
     assert!(found.is_err());
+}
+
+/// Fluid with a velocity in front of an outlet at x = 1, and the first `columns` of its buffer with another.
+fn at_an_outlet(columns: usize, velocity: [f64; 2], kept: [f64; 2]) -> (Settings, Particles<2>) {
+    let settings = common::parse(&box_between(json!([["none", "outlet"], ["slip", "slip"]])));
+    let place = |k: usize, l: usize| Vector::from([0.05 + 0.1 * k as f64, 0.55 + 0.1 * l as f64]);
+    let mut particles = common::particles((0..10 + columns).flat_map(|k| (0..15).map(move |l| place(k, l))).collect());
+    for i in 0..particles.real {
+        let inside = particles.position[i][0] < 1.0;
+        particles.velocity[i] = Vector::from(if inside { velocity } else { kept });
+        particles.kind[i] = if inside { ParticleKind::Fluid } else { ParticleKind::Outlet };
+    }
+    (settings, particles)
+}
+
+fn end(settings: &Settings, particles: &mut Particles<2>) -> MassFlow {
+    let mut grid = Grid::default();
+    grid.build(&particles.position, &particles.id, settings.support_radius(), settings.bounds());
+    end_step(particles, settings, &grid, 0.01)
+}
+
+#[test]
+fn a_buffer_that_fluid_comes_back_from_follows_it_and_stays_full() {
+    let (settings, mut particles) = at_an_outlet(2, [-0.5, 0.3], [0.4, 0.1]);
+    let before = particles.clone();
+    let flow = end(&settings, &mut particles);
+    let columns = (settings.buffer_length() / SPACING).round() as usize;
+    assert_eq!((particles.real, flow.returning), (15 * (10 + columns), 30));
+    assert_eq!((flow.inflow, flow.outflow), (0.0, 0.0));
+    for i in (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Outlet) {
+        assert_relative_eq!(particles.velocity[i], Vector::from([-0.5, 0.3]), epsilon = 1e-12);
+        assert_eq!(particles.pressure[i], 0.0);
+        let cells = (particles.position[i] - Vector::from([0.05, 0.55])) / SPACING;
+        let moved = if i < before.real { -0.001 / SPACING } else { 0.0 }; // back by what it has moved along the outlet
+        assert_relative_eq!(cells[1] - cells[1].round(), moved, epsilon = 1e-9);
+        assert_relative_eq!(cells[0], cells[0].round(), epsilon = 1e-9);
+    }
+    let mut ids = particles.id.clone();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), particles.real);
+    let full = particles.real;
+    end(&settings, &mut particles);
+    assert_eq!(particles.real, full);
+    // New ones go on with ids that none has had as long as the last ones are there.
+    let mut keep = vec![true; particles.real];
+    keep[before.real..before.real + 5].fill(false);
+    particles.retain(&keep);
+    let newest = *particles.id.iter().max().unwrap();
+    end(&settings, &mut particles);
+    assert_eq!(particles.real, full);
+    assert!(particles.id[full - 5..].iter().all(|&id| id > newest));
+}
+
+#[test]
+fn a_buffer_that_fluid_leaves_into_keeps_its_velocities() {
+    for (velocity, kept, follows) in [
+        (0.5, 0.4, false),
+        (0.01, 2.0, false),
+        (-0.01, 2.0, true),
+        (0.5, -0.1, true),
+        (0.9, 0.091, false),
+        (0.9, 0.089, true),
+    ] {
+        let (settings, mut particles) = at_an_outlet(3, [velocity, 0.0], [kept, 0.0]);
+        let flow = end(&settings, &mut particles);
+        let expected = if follows { velocity } else { kept };
+        assert_relative_eq!(particles.velocity[15 * 13 - 1][0], expected, epsilon = 1e-12);
+        assert_eq!(flow.returning, if velocity < 0.0 { 45 } else { 0 });
+        assert!(velocity < 0.0 || particles.real == 15 * 13);
+    }
+}
+
+#[test]
+fn of_those_that_crowd_in_a_buffer_that_follows_one_stays() {
+    let (settings, mut particles) = at_an_outlet(8, [-0.5, 0.0], [-0.5, 0.0]);
+    let middle = 15 * 12 + 7;
+    let added = particles.push_copy(middle);
+    particles.position[added] += Vector::from([0.02, 0.03]);
+    particles.id[added] = 9999;
+    particles.real += 1;
+    end(&settings, &mut particles);
+    assert!(particles.id.contains(&particles.id[middle]) && !particles.id.contains(&9999));
+    assert_eq!(particles.real, 15 * 18);
 }

@@ -567,7 +567,7 @@ fn a_refilled_particle_has_the_pressure_of_its_surroundings() {
     // One has crossed the inlet.
     let crossing = 8 * 4;
     particles.position[crossing][0] = 0.01;
-    end_step(&mut particles, &settings, &grid);
+    end_step(&mut particles, &settings, &grid, 0.01);
     let new = particles.id.iter().position(|&id| id == (1 << 40) + crossing as u64).expect("one follows");
     let last = crossing + 7;
     assert_relative_eq!(particles.position[new], Vector::from([-0.79, 0.45]), epsilon = 1e-12);

@@ -177,6 +177,20 @@ def test_remarks_of_a_run(tmp_path):
     assert broken.remarks[0].startswith("diverged: at tU/D = 29.9") and "of 60" in broken.remarks[0]
 
 
+def test_fluid_that_comes_back_through_an_outlet_is_remarked_upon(tmp_path):
+    """The outlet cuts the wake of a cylinder at Re = 40: it stays full, and the drag is that of a long channel."""
+    kwargs = {"reynolds": 40, "resolution": 8, "height": 5.0, "upstream": 2.0, "perturbation": 0.0}
+    short, long = (
+        Cylinder(length=length, **kwargs).run(tmp_path / f"{length}", until=15, progress=False) for length in (3.5, 6.5)
+    )
+    (told,) = [remark for remark in short.remarks if remark.startswith("backflow")]
+    assert "fluid comes back through" in told and not any("backflow" in remark for remark in long.remarks)
+    assert short.history["returning"][-1] > 0 == long.history["returning"][-1]
+    assert float(short.drag.mean) == pytest.approx(float(long.drag.mean), rel=0.05)
+    fluid = short.history["fluid"]
+    assert abs(fluid[-1] / fluid[0] - 1) < 0.02  # no voids
+
+
 def test_pictures_and_information_carry_the_remarks(tmp_path, alsph):
     path = write_run(tmp_path / "run")
     for figure in (Run(path).plot_forces(), Run(path).plot_field("pressure"), Run(path).plot_pressure_coefficient()):

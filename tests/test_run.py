@@ -21,7 +21,7 @@ HISTORY_COLUMNS = (
     "step time time_step iterations converged divergence_max divergence_mean divergence_sum velocity_max "
     "penalty_coefficient volume kinetic_energy potential_energy dissipation packing_min packing_max packing_rms "
     "residual surface isolated "
-    "mass_in mass_out inlet_pressure fluid inlet outlet solid "
+    "mass_in mass_out inlet_pressure fluid inlet outlet solid returning "
     "drag_coefficient drag_pressure drag_viscous lift_coefficient lift_pressure lift_viscous "
     "cylinder_pressure_force_x cylinder_pressure_force_y cylinder_viscous_force_x cylinder_viscous_force_y "
     "cylinder_pressure_torque cylinder_viscous_torque"

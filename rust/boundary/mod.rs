@@ -4,6 +4,7 @@ mod average;
 mod condition;
 mod flux;
 mod open;
+mod outlet;
 mod profile;
 mod solid;
 

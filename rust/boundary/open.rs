@@ -2,20 +2,28 @@
 
 use crate::base::Vector;
 use crate::base::parallel;
+use crate::boundary::outlet::Outlets;
 use crate::neighbours::Grid;
 use crate::particles::{ParticleKind, Particles, follower};
 use crate::settings::{Boundary, Settings};
 
-/// Mass that crossed the inlet and outlet planes.
+/// What crossed the inlet and outlet planes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MassFlow {
     pub inflow: f64,
     pub outflow: f64,
+    /// Number of particles in the buffers of outlets that come back.
+    pub returning: usize,
 }
 
 /// Turn, wrap, add and remove the particles that have crossed a side. `particles` hold no images; `grid` is of their
 /// positions before the step.
-pub fn end_step<const D: usize>(particles: &mut Particles<D>, settings: &Settings, grid: &Grid<D>) -> MassFlow {
+pub fn end_step<const D: usize>(
+    particles: &mut Particles<D>,
+    settings: &Settings,
+    grid: &Grid<D>,
+    time_step: f64,
+) -> MassFlow {
     let sides = sides(settings);
     let of = |kind| sides.iter().filter(|side| side.kind == kind).copied().collect::<Vec<_>>();
     // Most particles are inside, and stay what they are.
@@ -23,9 +31,17 @@ pub fn end_step<const D: usize>(particles: &mut Particles<D>, settings: &Setting
         let buffer = matches!(particles.kind[i], ParticleKind::Inlet | ParticleKind::Outlet);
         buffer || sides.iter().any(|side| side.inside(&particles.position[i]) <= 0.0)
     });
+    let outlets = of(Boundary::Outlet);
+    let buffers = Outlets { settings, outlets: &outlets, grid };
+    let following = buffers.follow(particles, &near, time_step);
+    let inward = |&&i: &&usize| {
+        outermost(&outlets, &particles.position[i])
+            .is_some_and(|(_, side)| side.inward * particles.velocity[i][side.axis] > 0.0)
+    };
+    let returning = following.iter().filter(inward).count();
     of(Boundary::Slip).iter().for_each(|side| side.reflect(particles, &near));
     of(Boundary::Periodic).iter().for_each(|side| side.wrap(particles, &near, settings));
-    let (mut left, mut gone) = leave(particles, &near, &of(Boundary::Outlet), settings.buffer_length());
+    let (mut left, mut gone) = leave(particles, &near, &outlets, settings.buffer_length());
     let open = of(Boundary::Air);
     let is_lost = |&i: &usize| open.iter().any(|side| side.inside(&particles.position[i]) < 0.0);
     let fluid = near.iter().copied().filter(|&i| particles.kind[i] == ParticleKind::Fluid);
@@ -33,23 +49,25 @@ pub fn end_step<const D: usize>(particles: &mut Particles<D>, settings: &Setting
     left += lost.len() as i64;
     gone.extend(lost);
     let entered = enter(particles, &near, &of(Boundary::Inlet), settings, grid);
+    gone.extend(buffers.crowded(particles, &following));
+    buffers.fill(particles);
     if !gone.is_empty() {
         let mut keep = vec![true; particles.real];
         gone.into_iter().for_each(|i| keep[i] = false);
         particles.retain(&keep);
     }
     let mass = settings.density * settings.particle_spacing.powi(D as i32);
-    MassFlow { inflow: mass * entered as f64, outflow: mass * left as f64 }
+    MassFlow { inflow: mass * entered as f64, outflow: mass * left as f64, returning }
 }
 
 /// One side of the domain.
 #[derive(Clone, Copy)]
-struct Side {
+pub(super) struct Side {
     kind: Boundary,
-    axis: usize,
-    plane: f64,
+    pub(super) axis: usize,
+    pub(super) plane: f64,
     /// +1 where the domain lies above the plane, −1 where it lies below.
-    inward: f64,
+    pub(super) inward: f64,
 }
 
 fn sides(settings: &Settings) -> Vec<Side> {
@@ -74,7 +92,7 @@ pub fn deep_in_inlet<const D: usize>(settings: &Settings) -> impl Fn(&Vector<D>)
 }
 
 /// The side that `position` is farthest beyond, or nearest to, and its distance inside it.
-fn outermost<const D: usize>(sides: &[Side], position: &Vector<D>) -> Option<(f64, Side)> {
+pub(super) fn outermost<const D: usize>(sides: &[Side], position: &Vector<D>) -> Option<(f64, Side)> {
     sides.iter().map(|&side| (side.inside(position), side)).min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
@@ -163,7 +181,7 @@ fn refill<const D: usize>(
 
 impl Side {
     /// Distance inside the domain.
-    fn inside<const D: usize>(&self, position: &Vector<D>) -> f64 {
+    pub(super) fn inside<const D: usize>(&self, position: &Vector<D>) -> f64 {
         self.inward * (position[self.axis] - self.plane)
     }
 

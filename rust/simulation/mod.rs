@@ -211,7 +211,7 @@ impl<const D: usize> Simulation<D> {
         let measured = measures_divergence(step.settings);
         let divergence = |i: usize| if measured { self.change[i].divergence } else { scheme.divergence(i) };
         report.outcome = Outcome::new(step.settings, particles, solved, divergence);
-        self.end_step(time_step);
+        report.returning = self.end_step(time_step);
         let loads = &report.loads;
         let reach = self.scheme.reach(time_step) / self.settings.particle_spacing;
         self.flow.motion.end(time_step, reach, |body| loads[body].total());
@@ -247,16 +247,17 @@ impl<const D: usize> Simulation<D> {
         frame.search_around(&self.settings, particles, travel, reorder, motion);
     }
 
-    /// Boundary crossings and clock.
-    fn end_step(&mut self, time_step: f64) {
+    /// Boundary crossings and clock. Returns how many particles come back in the buffers of outlets.
+    fn end_step(&mut self, time_step: f64) -> usize {
         self.flow.particles.drop_images();
         self.flow.particles.go_round(&self.settings.bodies);
-        let flow = boundary::end_step(&mut self.flow.particles, &self.settings, &self.flow.frame.grid);
+        let flow = boundary::end_step(&mut self.flow.particles, &self.settings, &self.flow.frame.grid, time_step);
         self.clock.mass_in += flow.inflow;
         self.clock.mass_out += flow.outflow;
         self.clock.time += time_step;
         self.clock.step += 1;
         self.prepared = false;
+        flow.returning
     }
 
     /// Largest velocity modulus of the particles: what u_max stands for in r_AL and in the stability law.

@@ -33,9 +33,9 @@ LARGEST_BLOCKAGE = 0.1
 SLOWED = 0.05
 """Share by which a cylinder may slow the stream at the inlet, (D/2)²/x² in potential flow."""
 
-OUTLET = 1.5
-"""Distance from the back of a cylinder to the outlet over D: with 1 runs broke down at Re = 100 and 200, with 1.5
-the drag was that with 5.5 (docs/reliability.md)."""
+OUTLET = 2.5
+"""Distance from the back of a cylinder to the outlet over D: with 1.5 no vortices were shed at Re = 200, with 2.5 the
+drag was that with 5.5 (docs/reliability.md)."""
 
 COMPRESSIBLE = 0.46
 """Largest artificial Mach number of the penalty with which results have been compared (docs/performance.md, Cost and
@@ -169,7 +169,7 @@ def channel(size: float, inlet: float, outlet: float, share: float, slowed: floa
     """
     remarks = []
     if outlet < OUTLET * size:
-        text = f"outlet {outlet:.3g} D behind the body; vortices leave as they form, which has made runs break down"
+        text = f"outlet {outlet:.3g} D behind the body; vortices leave as they form, and may not form at all"
         remarks.append(f"short channel: {text}, use a larger length")
     if slowed > SLOWED:
         text = f"inlet {inlet:.3g} D before the body, which slows the stream there by about {100 * slowed:.0f} %"

@@ -11,7 +11,7 @@ from alsph.cases.series import Series
 from alsph.engine.simulation import Simulation
 from alsph.geometry.particles import Kind
 
-NEAR = 2.0
+NEAR = 1.2
 """Distance along the wall [Δx] of the solid particles from a sensor whose pressures it feels."""
 
 ALIKE = 0.7

@@ -13,6 +13,9 @@ DIVERGENCE = 0.02
 
 FEW_PERIODS = 5
 
+BACKFLOW = 0.01
+"""Share of an outlet's buffer that comes back, in the mean over the window, from which on it is remarked upon."""
+
 
 def outcome(run: Record, until: str) -> list[str]:
     """Remark on how a run that was to reach `until` [D/U] in words ended, and on its statistics."""
@@ -29,7 +32,7 @@ def outcome(run: Record, until: str) -> list[str]:
         if has_surface(run.history):
             remedy = "particles at the surface and alone in the air count, too; more projection_sweeps lower it"
         found.append(f"not divergence-free: {text}; {remedy}")
-    found += lost(run)
+    found += [*lost(run), *backflow(run)]
     if run.body and run.window.edges.size:
         found += unsettled(run.window)
         if run.drag.mean < 0 and not (has_moved(run.history) or has_surface(run.history)):
@@ -65,6 +68,17 @@ def lost(run: Record) -> list[str]:
         return []
     share = f"{100 * (1 - fluid[-1] / fluid.max()):.2g} %"
     return [f"lost: {share} of the fluid has left through the sides open to the air; a larger domain keeps it"]
+
+
+def backflow(run: Record) -> list[str]:
+    """Remark on fluid that comes back through an outlet, of which nothing is known but the fluid beside it."""
+    history, window = run.history, run.window
+    inside = (history["time"] >= window.start) & (history["time"] <= window.end)
+    returning, buffer = (history.get(name, np.zeros(len(inside)))[inside] for name in ("returning", "outlet"))
+    if not buffer.sum() or (share := returning.sum() / buffer.sum()) < BACKFLOW:
+        return []
+    text = f"fluid comes back through {100 * share:.2g} % of the outlet; it is taken to be as the fluid beside it"
+    return [f"backflow: {text}, an outlet farther off has less"]
 
 
 def unsolved(run: Record, tolerance: float, cap: int) -> list[str]:
