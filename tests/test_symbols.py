@@ -92,7 +92,7 @@ def test_help_of_a_free_surface_has_its_names_and_what_applies(alsph, model):
     assert not OLD.search(text.replace("CPU", "")) and f"[{model.symbols.time}]" in text
     for hidden in (
         "shift",
-        *(["wall-", "surface-"] if not model(resolution=8).bodies() else []),
+        *(["wall-", "surface-"] if not (model(resolution=8).bodies() or "walls" in model.model_fields) else []),
         "density-relaxation",
         "inlet",
         "initial-run",

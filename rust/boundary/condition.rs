@@ -1,7 +1,7 @@
 //! What a particle obeys: the one place that every scheme reads.
 
 use crate::base::Vector;
-use crate::boundary::open::deep_in_inlet;
+use crate::boundary::side::deep_in_inlet;
 use crate::particles::ParticleKind;
 use crate::settings::{Settings, WallPressure};
 

@@ -6,6 +6,7 @@ mod flux;
 mod open;
 mod outlet;
 mod profile;
+mod side;
 mod solid;
 
 pub use average::{

@@ -4,7 +4,7 @@
 //! there the buffer follows the fluid, along the normal alone, and is kept full.
 
 use crate::base::{Vector, parallel};
-use crate::boundary::open::{Side, outermost};
+use crate::boundary::side::{Side, outermost};
 use crate::neighbours::Grid;
 use crate::particles::{ParticleKind, Particles, fresh_ids};
 use crate::settings::Settings;
