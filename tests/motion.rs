@@ -71,7 +71,7 @@ fn solids(particles: &Particles<2>) -> Vec<(u64, Vector<2>, Vector<2>, Vector<2>
     found
 }
 
-/// After many steps each solid is where the rule has it, with the normal and the velocity there, however far the body has come, and across
+/// After many steps each solid is where the rule has it, with the normal there and the velocity of the surface above it, however far the body has come, and across
 /// periodic sides.
 #[test]
 fn a_body_keeps_its_shape_wherever_it_goes() {
@@ -98,7 +98,8 @@ fn a_body_keeps_its_shape_wherever_it_goes() {
             assert!(away.norm() < 1e-9, "{frame}: {away:?}");
             assert!((0.0..1.0).contains(&now[0]) && (0.0..1.0).contains(&now[1]));
             assert_relative_eq!(normal, turned.normalize(), epsilon = 1e-7);
-            let speed = Vector::from([2.0 - pose.spin.z * turned[1], pose.velocity.y + pose.spin.z * turned[0]]);
+            let above = turned.normalize() * common::RADIUS;
+            let speed = Vector::from([2.0 - pose.spin.z * above[1], pose.velocity.y + pose.spin.z * above[0]]);
             assert_relative_eq!(velocity, speed, epsilon = 1e-6);
         }
     }

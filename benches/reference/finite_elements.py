@@ -28,6 +28,8 @@ class Flow:
         Order of the velocity's elements; that of the pressure's is one less.
     inflow
         The velocity (2,) at the inlet [U].
+    surface
+        The velocity (2,) of the body's surface, along itself [U].
     """
 
     def __init__(
@@ -36,13 +38,15 @@ class Flow:
         reynolds: float,
         order: int = 4,
         inflow: tuple[ng.CoefficientFunction | float, ...] = (1, 0),
+        surface: ng.CoefficientFunction | tuple[float, float] = (0, 0),
     ) -> None:
         self.mesh, self.body = mesh, mesh.Boundaries("body")
         velocity = ng.VectorH1(mesh, order=order, dirichletx="inlet|body", dirichlety="inlet|side|body")
         self.space = velocity * ng.H1(mesh, order=order - 1)
         self.flow, self._inflow = ng.GridFunction(self.space), ng.GridFunction(self.space)
         self.velocity, self.pressure = self.flow.components
-        self._inflow.components[0].Set(ng.CoefficientFunction(inflow), definedon=mesh.Boundaries("inlet"))
+        given = mesh.BoundaryCF({"inlet": ng.CoefficientFunction(inflow), "body": ng.CoefficientFunction(surface)})
+        self._inflow.components[0].Set(given, definedon=mesh.Boundaries("inlet|body"))
         self.flow.vec.data = self._inflow.vec
         (u, p), (v, q) = self.space.TnT()
         viscous = ng.InnerProduct(ng.Grad(u) + ng.Grad(u).trans, ng.Grad(v)) / reynolds
@@ -51,11 +55,7 @@ class Flow:
         self._convection = ng.LinearForm(self.space)
         self._convection += ng.InnerProduct(ng.Grad(self.velocity) * self.velocity, v) * ng.dx
         self._residual = self.flow.vec.CreateVector()
-        self._shifts = []  # of the body, along x and y
-        for direction in ((1, 0), (0, 1)):
-            shift = ng.GridFunction(self.space)
-            shift.components[0].Set(ng.CoefficientFunction(direction), definedon=self.body)
-            self._shifts.append(shift)
+        self._shifts = [self.shift(along) for along in ((1, 0), (0, 1))]
 
     def march(self, until: float, step: float, doublings: int = 0) -> Iterator[float]:
         """Go on from the velocity at t* = 0, which may slip on the body, to `until`; yield the time after each step.
@@ -90,18 +90,28 @@ class Flow:
         Newton(form, self.flow, inverse="umfpack", maxerr=1e-10, printing=False)
         form.Apply(self.flow.vec, self._residual)
 
+    def shift(self, along: tuple[ng.CoefficientFunction | float, ...]) -> ng.GridFunction:
+        """Return a velocity that the body's surface has and nothing else."""
+        shift = ng.GridFunction(self.space)
+        shift.components[0].Set(ng.CoefficientFunction(along), definedon=self.body)
+        return shift
+
+    def push(self, shift: ng.GridFunction) -> float:
+        """Return the power of the fluid on a body that moves so, over ½: what the momentum equation lacks on it."""
+        return -2 * ng.InnerProduct(self._residual, shift.vec)
+
     def loads(self) -> list[float]:
         """Return drag, its pressure and its viscous part, and those of the lift, with ½ρU²D.
 
-        The whole is what the momentum equation lacks on the body, which is more exact at corners than an integral over
-        the surface, as which the pressure's part is found; the viscous one is the rest.
+        The whole is :meth:`push`, which is more exact at corners than an integral over the surface, as which the
+        pressure's part is found; the viscous one is the rest.
         """
         loads = []
         for shift in self._shifts:
             moved = shift.components[0]
             density = ng.Grad(self.pressure) * moved + self.pressure * ng.div(moved)
-            whole, pressure = -ng.InnerProduct(self._residual, shift.vec), ng.Integrate(density, self.mesh)
-            loads += [2 * whole, 2 * pressure, 2 * (whole - pressure)]
+            whole, pressure = self.push(shift), 2 * ng.Integrate(density, self.mesh)
+            loads += [whole, pressure, whole - pressure]
         return loads
 
     def _implicit(self, rate: float) -> tuple[ng.BaseMatrix, ng.BaseMatrix, ng.BaseVector]:

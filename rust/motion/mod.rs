@@ -101,6 +101,8 @@ struct Shape<const D: usize> {
     body: usize,
     arm: Vector<D>,
     normal: Vector<D>,
+    /// The surface above it, whose velocity it has.
+    surface: Vector<D>,
     /// Whether it lies under the surface.
     outer: bool,
 }
@@ -185,8 +187,9 @@ impl<const D: usize> Motion<D> {
             *radius = radius.max(arm.norm());
             // Not of unit length to the last bit: that could be nearer to other multiples.
             let normal = back(&particles.normal[i], GRAIN);
-            let outer = particles.depth[i] < LAYER * settings.particle_spacing;
-            self.shape.push(Shape { id: particles.id[i], body, arm: back(&arm, grain), normal, outer });
+            let (arm, outer) = (back(&arm, grain), particles.depth[i] < LAYER * settings.particle_spacing);
+            let surface = arm + normal * particles.depth[i];
+            self.shape.push(Shape { id: particles.id[i], body, arm, normal, surface, outer });
         }
         self.shape.sort_unstable_by_key(|shape| shape.id);
         let mass = settings.density * settings.particle_spacing.powi(D as i32);
@@ -288,18 +291,19 @@ impl<const D: usize> Motion<D> {
         }
     }
 
-    /// Give them the velocities that they have at the end of the step.
+    /// Give them the velocities that the surface above them has at the end of the step.
     pub fn give_velocity(&self, velocity: &mut [Vector<D>]) {
         for &(i, shape) in &self.members {
-            let Shape { body, arm, .. } = &self.shape[shape];
+            let Shape { body, surface, .. } = &self.shape[shape];
             let Pose { angle, velocity: speed, spin, .. } = self.bodies[*body].end;
-            let arm = spatial(&turned(&angle, arm));
+            let arm = spatial(&turned(&angle, surface));
             let all = speed + spin.cross(&arm);
             velocity[i] = Vector::from_fn(|k, _| all[k]);
         }
     }
 
-    /// Set `out` to the accelerations of the first `count` particles, zero but of these bodies, at the end of the step; empty if there are none.
+    /// Set `out` to the accelerations of the first `count` particles at the end of the step, zero but of these bodies; empty if there are none.
+    /// As their velocities, they are those of the surface above them.
     pub fn accelerations(&self, count: usize, out: &mut Vec<Vector<D>>) {
         out.clear();
         if self.is_none() {
@@ -307,9 +311,9 @@ impl<const D: usize> Motion<D> {
         }
         out.resize(count, Vector::zeros());
         for &(i, shape) in &self.members {
-            let Shape { body, arm, .. } = &self.shape[shape];
+            let Shape { body, surface, .. } = &self.shape[shape];
             let Pose { angle, spin, acceleration, angular_acceleration, .. } = self.bodies[*body].end;
-            let arm = spatial(&turned(&angle, arm));
+            let arm = spatial(&turned(&angle, surface));
             let all = acceleration + angular_acceleration.cross(&arm) + spin.cross(&spin.cross(&arm));
             out[i] = Vector::from_fn(|k, _| all[k]);
         }

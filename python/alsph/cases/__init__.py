@@ -42,6 +42,7 @@ from alsph.cases.poiseuille import Poiseuille
 from alsph.cases.pressure_jump import PressureJump
 from alsph.cases.pulsating_channel import PulsatingChannel
 from alsph.cases.rolling_tank import RollingTank
+from alsph.cases.rotating_cylinder import RotatingCylinder
 from alsph.cases.rotating_patch import RotatingPatch
 from alsph.cases.settling_sphere import SettlingSphere
 from alsph.cases.sloshing import Sloshing
@@ -61,7 +62,7 @@ CASES: dict[str, type[Case]] = {
     for case in (
         *(Cylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Nozzle, Bend, Cavity),
         *(Poiseuille, Couette, TaylorCouette, PulsatingChannel, Pipe, PressureJump, TaylorGreen),
-        *(OscillatingCylinder, TowedCylinder, ConcentricRelease, SettlingSphere),
+        *(RotatingCylinder, OscillatingCylinder, TowedCylinder, ConcentricRelease, SettlingSphere),
         *(
             DamBreak,
             DamBreakObstacle,
@@ -108,6 +109,7 @@ __all__ = [
     "PressureJump",
     "PulsatingChannel",
     "RollingTank",
+    "RotatingCylinder",
     "RotatingPatch",
     "SettlingSphere",
     "Sloshing",

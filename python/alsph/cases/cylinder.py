@@ -67,7 +67,9 @@ class Cylinder(Channel):
         """
         measures = super().measures(run)
         if self.rules:
-            measures.append(Measure("mean lift coefficient", run.lift.mean))
+            known = self._reference() or Reference({}, "")
+            lift = known.results.get("mean lift coefficient", math.nan)
+            measures.append(Measure("mean lift coefficient", run.lift.mean, lift, 0.02, known.source))
         for profile in self.profiles(run):
             if not profile.reference[0].size or not profile.computed[0].size:
                 continue

@@ -36,6 +36,7 @@ class RotatingPatch(FreeSurface):
         *FreeSurface.later_names,
         "angular momentum over its start",
         "kinetic energy over its start",
+        "share of isolated particles",
     )
 
     resolution: int = Field(default=40, ge=8, description="particles per side, L/Δx [-]")
@@ -75,7 +76,7 @@ class RotatingPatch(FreeSurface):
             return rows
         snapshot, start = run.snapshot(), self.particles()
         turned = self._angular_momentum(snapshot.position, snapshot.velocity)
-        energy = run.history["kinetic_energy"]
+        energy, isolated, count = (run.history[name] for name in ("kinetic_energy", "isolated", "fluid"))
         source = "inviscid fluid"
         return [
             Measure(
@@ -86,6 +87,7 @@ class RotatingPatch(FreeSurface):
                 source,
             ),
             Measure("kinetic energy over its start", float(energy[-1] / energy[0]), 1.0, 0.05, source),
+            Measure("share of isolated particles", float(isolated[-1] / count[-1]), 0.0, 0.01, "a patch without voids"),
             *rows,
         ]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from typing import Any, ClassVar, Self
 
@@ -38,8 +39,10 @@ FALTINSEN = {"length": 2.883, "amplitude": 0.05333, "frequency": 1.1953, "phase"
 """The experiment of Faltinsen, Rognebakke, Lukovsky and Timokha (J. Fluid Mech. 407 (2000) 201, figure 7): a tank of
 1.73 m with 0.6 m of water, swayed by 0.032 m every 1.3 s, and a gauge 0.05 m from its left wall."""
 
-CRESTS = {10.4: 0.142 / 0.6, 16.3: 0.109 / 0.6}
-"""Crests there [H], of the second and the third wave, at about these times [√(H/g)]."""
+EXTREMA = {4.7: "crest", 7.8: "trough", 10.4: "crest", 13.2: "trough", 16.3: "crest", 19.0: "trough"}
+"""What there is at about these times [√(H/g)]."""
+BESIDE = 1.0
+"""How far from these a crest or trough is looked for [√(H/g)]."""
 
 
 def irrotational_level(
@@ -114,7 +117,7 @@ class Sloshing(FreeSurface):
     name: ClassVar[str] = "sloshing"
     title: ClassVar[str] = "sloshing in a tank that sways"
     later_names: ClassVar[tuple[str, ...]] = (
-        "crest near t = ",
+        *(f"{before}{kind} near t = " for kind in ("crest", "trough") for before in ("", "time of the ")),
         "largest error of the elevation over the largest",
         "elevation at the gauge",
         "elevation at the gauge, experiment",
@@ -200,17 +203,19 @@ class Sloshing(FreeSurface):
         if len(until) > 1:
             error = np.abs(np.interp(until, time, level[0]) - 1 - exact).max() / np.abs(exact).max()
             rows = [Measure("largest error of the elevation over the largest", float(error), 0.0, within, theory)]
-        return rows + [
-            Measure(
-                f"crest near t = {at:g}, H",
-                float((level[0] - 1)[np.abs(time - at) < 1].max()),
-                height,
-                0.1,
-                "experiment (Faltinsen et al. 2000)",
-            )
-            for at, height in CRESTS.items()
-            if self._is_the_experiment and time[-1] > at + 1
-        ]
+        if self._is_the_experiment:
+            rows += self._extrema(time, level[0] - 1)
+        return rows
+
+    def _extrema(self, time: FloatArray, level: FloatArray) -> Iterator[Measure]:
+        """Yield height and time of each crest and trough that the run covers, beside the experiment's."""
+        source, measured = "experiment (Faltinsen et al. 2000)", reference.table("sloshing_faltinsen.csv")
+        for at, kind in EXTREMA.items():
+            if time[-1] > at + BESIDE:
+                found, known = _extremum(time, level, at, kind), _extremum(measured[0], measured[1], at, kind)
+                yield Measure(f"{kind} near t = {at:g}, H", found[1], known[1], 0.1, source)
+                within = 0.03 * 2 * np.pi / self.frequency / known[0]
+                yield Measure(f"time of the {kind} near t = {at:g}, √(H/g)", found[0], known[0], within, source)
 
     def _theory(self, time: FloatArray) -> tuple[tuple[FloatArray, FloatArray], str, float]:
         """Return times and elevation of theory up to the last of these times, which it is, and how near it is to be."""
@@ -235,3 +240,10 @@ class Sloshing(FreeSurface):
             known, source = tuple(reference.table("sloshing_faltinsen.csv")), "experiment (Faltinsen et al. 2000)"
             drawn.append(Profile("elevation at the gauge, experiment", axes, here, known, source))
         return drawn
+
+
+def _extremum(time: FloatArray, level: FloatArray, at: float, kind: str) -> tuple[float, float]:
+    """Return time and height of the crest or trough about a time."""
+    near = np.flatnonzero(np.abs(time - at) < BESIDE)
+    place = near[level[near].argmax() if kind == "crest" else level[near].argmin()]
+    return float(time[place]), float(level[place])

@@ -1,0 +1,98 @@
+"""Flow past a circular cylinder that rotates in a channel."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field
+
+from alsph import reference
+from alsph.analysis.measures import Measure, Profile
+from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
+from alsph.cases.cylinder import Cylinder
+from alsph.reference import Reference
+
+GIVEN = ("Re", "speed", "L_over_D", "H_over_D", "LU_over_D")
+SOURCE = "finite elements in the same channel"
+EARLY = (2.0, 4.0)
+"""Times [D/U] between which the loads are averaged while the wake behind the impulsive start still grows."""
+
+
+class RotatingCylinder(Cylinder):
+    """Flow past a circular cylinder that rotates in a channel with free-slip walls and uniform inflow U.
+
+    Its surface goes round at a constant speed, from the start on: counterclockwise where that is positive, which pushes
+    the cylinder down. The cylinder is round, so that its particles stay in place and have the velocity of the surface
+    above them.
+
+    In unbounded flow at Re = 100 the wake sheds vortices up to a surface speed of about 1.8 U (Kang, Choi and Lee,
+    Phys. Fluids 11 (1999) 3312).
+    """
+
+    name: ClassVar[str] = "rotating_cylinder"
+    title: ClassVar[str] = "flow past a cylinder that rotates"
+    velocity_max: ClassVar[float] = 2.5
+    later_names: ClassVar[tuple[str, ...]] = ()
+
+    reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
+    perturbation: float = Field(
+        default=0.0, ge=0, le=1, description="largest velocity of an initial vortex about the body [U]"
+    )
+    surface_speed: float = Field(
+        default=1.0, ge=-4, le=4, description="speed of the surface, counterclockwise where positive [U]"
+    )
+
+    @property
+    def validated(self) -> tuple[float, float, int]:
+        """What has been compared with an independent solution."""
+        return (100, 100, 10)
+
+    def sliding(self, position: FloatArray, time: float) -> ArrayLike:
+        """Return the velocity of the surface [U]."""
+        x, y = (position - self.centre).T
+        return 2 * self.surface_speed * np.stack([-y, x], axis=1)
+
+    def measures(self, run: Record) -> list[Measure]:
+        """Return the loads soon after the start, then forces and Strouhal number of the flow that has developed."""
+        history, known = run.history, {} if self.perturbation else self._known("start")
+        time, step = history["time"], history["time_step"]
+        within = (time > EARLY[0]) & (time <= EARLY[1])
+        whole = len(time) > 0 and time[-1] >= EARLY[1] - self.particle_spacing
+
+        def early(name: str, column: str, *parts: str) -> Measure:
+            total = np.sum([history[part] for part in parts], axis=0)
+            value = float(np.average(total[within], weights=step[within])) if whole else math.nan
+            when = f"tU/D from {EARLY[0]:g} to {EARLY[1]:g}"
+            return Measure(f"{name}, {when}", value, known.get(column, math.nan), 0.05, SOURCE)
+
+        return [
+            early("drag coefficient", "CD_mean", "drag_coefficient"),
+            early("lift coefficient", "CL_mean", "lift_coefficient"),
+            early("torque, ρU²D²", "torque", "cylinder_pressure_torque", "cylinder_viscous_torque"),
+            *super().measures(run),
+        ]
+
+    def profiles(self, run: Record) -> list[Profile]:
+        """Return the mean pressure coefficient over the angle."""
+        found = run.pressure_coefficient
+        axes = r"$\theta$ from the front stagnation point [degrees]", "$C_p$"
+        return [Profile("pressure coefficient", axes, (found.theta, found.mean), (np.empty(0), np.empty(0)), "")]
+
+    def _reference(self) -> Reference | None:
+        known = self._known("developed")
+        names = reference.COLUMNS | {"mean lift coefficient": "CL_mean"}
+        return Reference({name: known[column] for name, column in names.items()}, SOURCE) if known else None
+
+    def _known(self, flow: str) -> dict[str, float]:
+        """Return what is known of the flow soon after the start, or of the one that has developed; empty if nothing."""
+        given = (self.reynolds, abs(self.surface_speed), self.length, self.height, self.upstream)
+        mirrored = math.copysign(1.0, self.surface_speed)
+        for row in reference.rows("rotating_cylinder.csv"):
+            if row.pop("flow") == flow and tuple(float(row[name]) for name in GIVEN) == given:
+                known = {name: float(value) for name, value in row.items()}
+                return known | {name: mirrored * known[name] for name in ("CL_mean", "torque")}
+        return {}
