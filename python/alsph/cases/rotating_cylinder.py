@@ -69,13 +69,15 @@ class RotatingCylinder(Cylinder):
     def measures(self, run: Record) -> list[Measure]:
         """Return the loads soon after the start, then forces and Strouhal number of the flow that has developed."""
         history, known = run.history, {} if self.perturbation else self._known("start")
-        time, step = history["time"], history["time_step"]
+        time = history["time"]
         within = (time > EARLY[0]) & (time <= EARLY[1])
         whole = len(time) > 0 and time[-1] >= EARLY[1] - self.particle_spacing
 
         def early(name: str, column: str, *parts: str) -> Measure:
-            total = np.sum([history[part] for part in parts], axis=0)
-            value = float(np.average(total[within], weights=step[within])) if whole else math.nan
+            value = math.nan
+            if whole:
+                total = np.sum([history[part] for part in parts], axis=0)
+                value = float(np.average(total[within], weights=history["time_step"][within]))
             when = f"tU/D from {EARLY[0]:g} to {EARLY[1]:g}"
             return Measure(f"{name}, {when}", value, known.get(column, math.nan), 0.05, SOURCE)
 
