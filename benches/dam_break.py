@@ -12,7 +12,8 @@ import json
 import numpy as np
 from alsph.arrays import FloatArray
 from alsph.cases import DamBreak
-from alsph.cases.dam_break import SENSORS, WINDOWS, _impulse
+from alsph.cases.dam_break import SENSORS, WINDOWS, impulse
+from alsph.geometry.particles import Kind
 
 UNTIL, INTERVAL, DISPLACED = 8.0, 0.01, 1e-3
 BESIDE = 1.5
@@ -26,7 +27,6 @@ def course(case: DamBreak, seed: int) -> dict[str, float]:
         displaced = DISPLACED * case.particle_spacing
         state["position"] += np.random.default_rng(seed).uniform(-displaced, displaced, state["position"].shape)
     simulation = case.restored(state, threads=1)
-    count = int(simulation.history()["fluid"][0]) if len(simulation.history()["fluid"]) else len(state["position"])
     front, sensors = case.outputs()
     rows = []
     for time in np.arange(INTERVAL, UNTIL + INTERVAL / 2, INTERVAL):
@@ -34,8 +34,8 @@ def course(case: DamBreak, seed: int) -> dict[str, float]:
         rows.append([simulation.time, *front.values(simulation), *sensors.values(simulation)])
     time, way, *pressures = np.array(rows).T
     found = {
-        f"{name} {start:g} to {end:g}": _impulse((time, pressure), (start, end))
-        / _impulse(sensor.measured(), (start, end))
+        f"{name} {start:g} to {end:g}": impulse((time, pressure), (start, end))
+        / impulse(sensor.measured(), (start, end))
         for (name, sensor), pressure in zip(SENSORS.items(), pressures, strict=True)
         for start, end in WINDOWS
     }
@@ -46,7 +46,7 @@ def course(case: DamBreak, seed: int) -> dict[str, float]:
         "impact": float(time[met.argmax()]),
         "rise of the energy, %": 100 * float((energy - energy[0]).max() / energy[0]),
         "energy at the end, %": 100 * float(energy[-1] / energy[0]),
-        "particles lost": float(count - history["fluid"][-1]),
+        "particles lost": float(np.count_nonzero(state["kind"] == Kind.FLUID) - history["fluid"][-1]),
     }
 
 

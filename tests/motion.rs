@@ -71,8 +71,8 @@ fn solids(particles: &Particles<2>) -> Vec<(u64, Vector<2>, Vector<2>, Vector<2>
     found
 }
 
-/// After many steps each solid is where the rule has it, with the normal there and the velocity of the surface above it, however far the body has come, and across
-/// periodic sides.
+/// After many steps each solid is where the rule has it, with the normal there and the velocity of the surface above it, however far the body
+/// has come, and across periodic sides.
 #[test]
 fn a_body_keeps_its_shape_wherever_it_goes() {
     for frame in ["midpoint", "initial", "updated"] {

@@ -80,6 +80,19 @@ def test_a_turning_cylinder_is_the_same_by_expressions_as_by_a_method():
     assert 0.05 < speed.max() < 0.13
 
 
+def test_a_cylinder_that_turns_is_lifted_as_it_should_be():
+    """Counterclockwise in a stream along x: downwards, C_L near -2.5 at a surface speed of U (Re = 100 to 200)."""
+    case = Cylinder(
+        resolution=10, length=8, height=6, upstream=3, perturbation=0.0, surface_velocity="-2*y, 2*(x - upstream)"
+    )
+    simulation = case.simulation(threads=1)
+    simulation.run_until(8.0)
+    history = simulation.history()
+    late = history["time"] > 6
+    assert -3.4 < history["lift_coefficient"][late].mean() < -2.0
+    assert (history["cylinder_viscous_torque" if "cylinder_viscous_torque" in history else "viscous_torque"] != 0).any()
+
+
 def test_loads_with_a_body_force_are_the_momentum_balance():
     """The inflow being given, it is taken up by pressure, which pushes the body against it."""
     room = {"reynolds": 100, "resolution": 10, "length": 7, "height": 6, "upstream": 2.5, "perturbation": 0.0}

@@ -288,7 +288,7 @@ class DamBreak(FreeSurface):
         covered = [(start, end) for start, end in WINDOWS if len(time) and time[0] <= start and end <= time[-1]]
         for (name, sensor), own in zip(SENSORS.items(), pressure, strict=False):
             for window in covered:
-                found, measured = _impulse((time, own), window), _impulse(sensor.measured(), window)
+                found, measured = impulse((time, own), window), impulse(sensor.measured(), window)
                 yield Measure(impulse_name(name, window), found, measured, 0.15, sensor.source)
 
     def profiles(self, run: Record) -> list[Profile]:
@@ -309,7 +309,7 @@ class DamBreak(FreeSurface):
         return [profile for profile in drawn if profile.computed[1].any()]
 
 
-def _impulse(curve: tuple[FloatArray, FloatArray], window: tuple[float, float]) -> float:
+def impulse(curve: tuple[FloatArray, FloatArray], window: tuple[float, float]) -> float:
     """Return ∫ p dt between two times of a curve that is linear between its points."""
     time = curve[0]
     at = np.array([window[0], *time[(time > window[0]) & (time < window[1])], window[1]])
