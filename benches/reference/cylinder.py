@@ -47,19 +47,9 @@ def comparison_points() -> np.ndarray:
 def solve(until: float, resolutions: list[int], output: Path, step: float = 0.002) -> None:
     """Write the forces, the velocity at the points of comparison, and at t* = 2 the fields at the cell centres."""
     import ngsolve as ng
-    from finite_elements import Flow
-    from netgen.occ import Circle, Glue, MoveTo, OCCGeometry
+    from finite_elements import Flow, past_cylinder
 
-    channel = MoveTo(0, -HEIGHT / 2).Rectangle(LENGTH, HEIGHT).Face()
-    for edge in channel.edges:
-        at = edge.center.x
-        edge.name = "inlet" if abs(at) < 1e-6 else "outlet" if abs(at - LENGTH) < 1e-6 else "side"
-    wake = MoveTo(UPSTREAM - 1, -1.5).Rectangle(LENGTH - UPSTREAM + 1, 3).Face()
-    near, disc = (Circle((UPSTREAM, 0), radius).Face() for radius in (1.0, RADIUS))
-    wake.faces.maxh, near.faces.maxh = 0.22, 0.13
-    disc.edges.name, disc.edges.maxh = "body", 0.08
-    parts = Glue([channel - wake - near - disc, wake - near - disc, near - disc])
-    mesh = ng.Mesh(OCCGeometry(parts, dim=2).GenerateMesh(maxh=0.8, grading=0.3)).Curve(5)
+    mesh = past_cylinder((LENGTH, HEIGHT, UPSTREAM), (-1.5, 3), 0.22, curve=5)
     x, y = (ng.x - UPSTREAM) / 0.6, ng.y / 0.6
     swirl = PERTURBATION * ng.exp(0.5 * (1 - x * x - y * y))
     flow = Flow(mesh, REYNOLDS)

@@ -8,11 +8,31 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import netgen.occ as occ
 import ngsolve as ng
 from ngsolve.nonlinearsolvers import Newton
 
 HOLD = 16
 """The step may be doubled when this many of it have been taken."""
+
+
+def past_cylinder(channel: tuple[float, float, float], wake: tuple[float, float], size: float, curve: int) -> ng.Mesh:
+    """Return the mesh of a channel (length, height, upstream) [D] around a cylinder.
+
+    From 1 D before its centre to the outlet, from a height `wake[0]` on and `wake[1]` high [D], elements have a `size`
+    [D]; they are of the order `curve` at the cylinder.
+    """
+    length, height, upstream = channel
+    whole = occ.MoveTo(0, -height / 2).Rectangle(length, height).Face()
+    for edge in whole.edges:
+        at = edge.center.x
+        edge.name = "inlet" if abs(at) < 1e-6 else "outlet" if abs(at - length) < 1e-6 else "side"
+    behind = occ.MoveTo(upstream - 1, wake[0]).Rectangle(length - upstream + 1, wake[1]).Face()
+    near, disc = (occ.Circle((upstream, 0), radius).Face() for radius in (1.0, 0.5))
+    behind.faces.maxh, near.faces.maxh = size, 0.13
+    disc.edges.name, disc.edges.maxh = "body", 0.08
+    parts = occ.Glue([whole - behind - near - disc, behind - near - disc, near - disc])
+    return ng.Mesh(occ.OCCGeometry(parts, dim=2).GenerateMesh(maxh=0.8, grading=0.3)).Curve(curve)
 
 
 class Flow:

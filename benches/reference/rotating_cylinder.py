@@ -15,13 +15,11 @@ import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
-from finite_elements import Flow
+from finite_elements import Flow, past_cylinder
 
 EARLY, UNTIL, PERIODS, DOUBLINGS, LONGER = (2.0, 4.0), 60.0, 4, 7, 4.0
-FAR, WAKE, NEAR, SURFACE = 0.8, 0.25, 0.13, 0.08  # sizes of the elements [D]
 LOADS = ["CD_mean", "CDp", "CDf", "CL_mean", "CLp", "CLf", "torque"]
 FOUND = [*LOADS, "CL_rms", "CL_amp", "St_fD_over_U"]
 CHANGES = ["moved_by_order", "moved_by_step", "moved_by_outlet"]
@@ -38,17 +36,7 @@ class Stream:
 
     def mesh(self) -> ng.Mesh:
         """Return the channel around the cylinder."""
-        length, height, upstream = self.channel
-        channel = occ.MoveTo(0, -height / 2).Rectangle(length, height).Face()
-        for edge in channel.edges:
-            at = edge.center.x
-            edge.name = "inlet" if abs(at) < 1e-6 else "outlet" if abs(at - length) < 1e-6 else "side"
-        wake = occ.MoveTo(upstream - 1, -2).Rectangle(length - upstream + 1, 3.5).Face()
-        near, disc = (occ.Circle((upstream, 0), radius).Face() for radius in (1.0, 0.5))
-        wake.faces.maxh, near.faces.maxh = WAKE, NEAR
-        disc.edges.name, disc.edges.maxh = "body", SURFACE
-        parts = occ.Glue([channel - wake - near - disc, wake - near - disc, near - disc])
-        return ng.Mesh(occ.OCCGeometry(parts, dim=2).GenerateMesh(maxh=FAR, grading=0.3)).Curve(6)
+        return past_cylinder(self.channel, (-2, 3.5), 0.25, curve=6)
 
     def history(self, until: float, order: int, step: float) -> np.ndarray:
         """Return the columns time, loads and torque (8, n) of a flow that is U everywhere at t* = 0."""
