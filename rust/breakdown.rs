@@ -28,12 +28,13 @@ pub struct Symptom {
 }
 
 /// The first particle, if any, that has a value that is not finite, would cross more than Δx in a step, is faster than the
-/// velocity limit, has left the domain through a wall, has gone into a body, or has no neighbours,
+/// velocity limit and not alone in the air, has left the domain through a wall, has gone into a body, or has no neighbours,
 /// or too few for a gradient.
 pub fn find<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
     frame: &Frame<D>,
+    is_alone: impl Fn(usize) -> bool + Sync,
     time_step: f64,
 ) -> Option<Symptom> {
     let volume = &frame.stencil.volume;
@@ -55,6 +56,8 @@ pub fn find<const D: usize>(
             return if beyond > OUTSIDE * settings.particle_spacing { symptom("position", beyond) } else { None };
         }
         let speed = particles.velocity[i].norm();
+        // A drop of a splash is no sign of a breakdown, however fast it is.
+        let fastest = if is_alone(i) { settings.particle_spacing / time_step } else { fastest };
         if speed.is_nan() || speed > fastest {
             return symptom("velocity", speed);
         }

@@ -30,7 +30,7 @@ mod simulation;
 pub mod surface;
 
 pub use base::{Error, Matrix, Result, Vector};
-pub use particles::{ParticleKind, Particles};
+pub use particles::{ParticleKind, Particles, Place};
 pub use report::{Clock, Report};
 pub use settings::Settings;
 pub use simulation::{Simulation, Snapshot};

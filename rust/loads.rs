@@ -187,7 +187,7 @@ fn components<const D: usize>(v: &Vector<D>) -> [f64; 3] {
     std::array::from_fn(|k| if k < D { v[k] } else { 0.0 })
 }
 
-fn cross<const D: usize>(a: &Vector<D>, b: &Vector<D>) -> [f64; 3] {
+pub fn cross<const D: usize>(a: &Vector<D>, b: &Vector<D>) -> [f64; 3] {
     let [a, b] = [a, b].map(|v| nalgebra::Vector3::from(components(v)));
     a.cross(&b).into()
 }

@@ -40,6 +40,43 @@ impl TryFrom<u8> for ParticleKind {
     }
 }
 
+/// Where a particle is beside a free surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Place {
+    #[default]
+    Inside = 0,
+    /// Its support is cut, and it has particles at the surface in it.
+    Near = 1,
+    AtSurface = 2,
+    /// It has no pressure: it flies, but for what others push it with.
+    Isolated = 3,
+}
+
+impl Place {
+    /// Whether part of what surrounds it is air.
+    pub fn sees_air(self) -> bool {
+        matches!(self, Self::Near | Self::AtSurface)
+    }
+}
+
+impl TryFrom<u8> for Place {
+    type Error = Error;
+
+    fn try_from(value: u8) -> Result<Self> {
+        match value {
+            0 => Ok(Self::Inside),
+            1 => Ok(Self::Near),
+            2 => Ok(Self::AtSurface),
+            3 => Ok(Self::Isolated),
+            _ => {
+                let problem = format!("{value} is not 0 inside, 1 near the surface, 2 at the surface or 3 isolated");
+                Err(Error::Array { name: "place", problem })
+            }
+        }
+    }
+}
+
 /// Arrays of one length. The first `real` entries are particles, the rest their images across walls and periodic sides.
 #[derive(Clone, Debug, Default)]
 pub struct Particles<const D: usize> {
@@ -54,6 +91,8 @@ pub struct Particles<const D: usize> {
     pub normal: Vec<Vector<D>>,
     /// Distance of a solid particle below the surface of its body.
     pub depth: Vec<f64>,
+    /// As the last step found it; all inside where the fluid fills its domain.
+    pub place: Vec<Place>,
     /// No two alike, and the same however the particles are stored; see [`follower`].
     pub id: Vec<u64>,
 }
@@ -64,7 +103,7 @@ macro_rules! each_array {
         each_array!($particles, (&mut) $array, _name => $f)
     };
     ($particles:ident, ($($reference:tt)+) $array:ident, $name:ident => $f:expr) => {
-        each_array!(@ $particles, ($($reference)+) $array, $name => $f; position velocity pressure kind body normal depth id)
+        each_array!(@ $particles, ($($reference)+) $array, $name => $f; position velocity pressure kind body normal depth place id)
     };
     (@ $particles:ident, $reference:tt $array:ident, $name:ident => $f:expr; $($field:ident)*) => {
         $(each_array!(@one $particles, $reference $array, $name => $f; $field);)*

@@ -3,10 +3,10 @@
 use crate::base::{Vector, exact_sums, parallel};
 use crate::discretisation::Stencil;
 use crate::flow::{Flow, Step};
-use crate::loads::Load;
+use crate::loads::{Load, cross};
 use crate::motion::Pose;
-use crate::particles::{ParticleKind, Particles};
-use crate::scheme::Outcome;
+use crate::particles::{ParticleKind, Particles, Place};
+use crate::scheme::{Outcome, Taken};
 use crate::settings::{Boundary, Settings};
 use std::ops::Range;
 
@@ -32,14 +32,17 @@ pub struct Report<const D: usize> {
     pub penalty: f64,
     /// Fluid particles that the sums of this report run over.
     pub fluid: usize,
-    /// Σ V_i and ½ρ Σ V_i u_i² of the fluid.
+    /// Σ V_i and ½ρ Σ V_i u_i² of the fluid; beside a surface V is in the volume what the number density tells of a particle inside.
     pub volume: f64,
     pub kinetic_energy: f64,
+    /// ρΔx^D Σ r_i × u_i of the fluid at the end of the step, about the origin.
+    pub angular_momentum: [f64; 3],
     /// −ρ Σ V_i g·r_i of the fluid at the end of the step, g being the body force of the settings.
     pub potential_energy: f64,
     pub packing: Packing,
     /// What viscosity takes of the kinetic energy in unit time, see [`dissipation`].
     pub dissipation: f64,
+    pub taken: Taken,
     /// Mean pressure within Δx of the inlet plane; NaN without an inlet.
     pub inlet_pressure: f64,
     /// Fluid, inlet, outlet, solid at the end of the step.
@@ -54,7 +57,7 @@ pub struct Report<const D: usize> {
 }
 
 /// How closely the fluid particles lie: their number density Σ W over that of the undisturbed lattice, 1 where the density of the fluid
-/// has been kept.
+/// has been kept; of those whose support no surface cuts.
 #[derive(Clone, Copy, Debug)]
 pub struct Packing {
     pub min: f64,
@@ -93,6 +96,14 @@ pub fn columns<const D: usize>() -> Vec<(&'static str, Column<D>)> {
         ("kinetic_energy", Number(|r| r.kinetic_energy)),
         ("potential_energy", Number(|r| r.potential_energy)),
         ("dissipation", Number(|r| r.dissipation)),
+        ("artificial_dissipation", Number(|r| r.taken.artificial)),
+        ("penalty_dissipation", Number(|r| r.taken.penalty)),
+        ("pressure_dissipation", Number(|r| r.taken.pressure)),
+        ("sweep_dissipation", Number(|r| r.taken.sweeps)),
+        ("contact_dissipation", Number(|r| r.taken.contact)),
+        ("angular_momentum_x", Number(|r| r.angular_momentum[0])),
+        ("angular_momentum_y", Number(|r| r.angular_momentum[1])),
+        ("angular_momentum_z", Number(|r| r.angular_momentum[2])),
         ("packing_min", Number(|r| r.packing.min)),
         ("packing_max", Number(|r| r.packing.max)),
         ("packing_rms", Number(|r| r.packing.rms)),
@@ -124,15 +135,23 @@ pub fn columns<const D: usize>() -> Vec<(&'static str, Column<D>)> {
 impl<const D: usize> Report<D> {
     /// The report of a step whose iteration has ended and whose particles have not yet been shifted; clock, counts, outcome and dissipation
     /// come after.
-    pub fn new(step: Step, particles: &Particles<D>, stencil: &Stencil<D>, penalty: f64, loads: Vec<Load<D>>) -> Self {
+    pub fn new(step: Step, flow: &Flow<D>, penalty: f64, loads: Vec<Load<D>>) -> Self {
+        let Flow { particles, frame, surface, .. } = flow;
         let undisturbed = step.settings.undisturbed_volume();
-        let Stencil { volume, number_density, .. } = stencil;
-        let [total, square, uneven] = exact_sums(particles.real, |i| {
+        let Stencil { volume, number_density, .. } = &frame.stencil;
+        let has_surface = step.settings.free_surface.is_some();
+        let is_whole = |i: usize| !has_surface || surface.place[i] == Place::Inside;
+        let [total, square, uneven, whole] = exact_sums(particles.real, |i| {
             let fluid = particles.kind[i] == ParticleKind::Fluid;
-            let uneven = || undisturbed * number_density[i] - 1.0;
-            fluid.then(|| [volume[i], volume[i] * particles.velocity[i].norm_squared(), uneven() * uneven()])
+            fluid.then(|| {
+                let whole = is_whole(i);
+                let uneven = if whole { undisturbed * number_density[i] - 1.0 } else { 0.0 };
+                let filled = if has_surface && whole { 1.0 / number_density[i] } else { volume[i] };
+                let square = volume[i] * particles.velocity[i].norm_squared();
+                [filled, square, uneven * uneven, f64::from(u8::from(whole))]
+            })
         });
-        let [least, largest] = extremes(particles, number_density);
+        let [least, largest] = extremes(particles, number_density, is_whole);
         let fluid = particles.counts()[ParticleKind::Fluid as usize];
         Self {
             clock: Clock::default(),
@@ -149,9 +168,11 @@ impl<const D: usize> Report<D> {
             fluid,
             volume: total,
             kinetic_energy: 0.5 * step.settings.density * square,
+            angular_momentum: [f64::NAN; 3],
             potential_energy: f64::NAN,
-            packing: Packing { min: undisturbed * least, max: undisturbed * largest, rms: (uneven / fluid as f64).sqrt() },
+            packing: Packing { min: undisturbed * least, max: undisturbed * largest, rms: (uneven / whole).sqrt() },
             dissipation: f64::NAN,
+            taken: Taken::default(),
             inlet_pressure: inlet_pressure(step.settings, particles),
             counts: [0; 4],
             returning: 0,
@@ -162,10 +183,10 @@ impl<const D: usize> Report<D> {
     }
 }
 
-/// The least and the largest number density of the fluid particles; of no fluid no numbers.
-fn extremes<const D: usize>(particles: &Particles<D>, density: &[f64]) -> [f64; 2] {
+/// The least and the largest number density of the fluid particles that are `whole`; of no fluid no numbers.
+fn extremes<const D: usize>(particles: &Particles<D>, density: &[f64], whole: impl Fn(usize) -> bool + Sync) -> [f64; 2] {
     let wider = |[least, largest]: [f64; 2], [a, b]: [f64; 2]| [least.min(a), largest.max(b)];
-    let fluid = |i: &usize| particles.kind[*i] == ParticleKind::Fluid;
+    let fluid = |i: &usize| particles.kind[*i] == ParticleKind::Fluid && whole(*i);
     let of = |range: Range<usize>| range.filter(fluid).fold([f64::NAN; 2], |known, i| wider(known, [density[i]; 2]));
     parallel::reduce(particles.real, of, wider).unwrap_or([f64::NAN; 2])
 }
@@ -186,6 +207,15 @@ pub fn dissipation<const D: usize>(
     });
     let given: f64 = loads.iter().map(|load| load.sliding_power).sum();
     step.settings.density * step.settings.kinematic_viscosity * taken + given
+}
+
+/// [`Report::angular_momentum`] of particles at the end of a step.
+pub fn angular_momentum<const D: usize>(settings: &Settings, particles: &Particles<D>) -> [f64; 3] {
+    let sums = exact_sums(particles.real, |i| {
+        (particles.kind[i] == ParticleKind::Fluid).then(|| cross(&particles.position[i], &particles.velocity[i]))
+    });
+    let mass = settings.density * settings.particle_spacing.powi(D as i32);
+    sums.map(|sum| mass * sum)
 }
 
 /// [`Report::potential_energy`] once the particles have moved.

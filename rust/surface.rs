@@ -9,7 +9,7 @@ use crate::discretisation::{Correction, Largest, Surroundings};
 use crate::frame::Frame;
 use crate::halo::Poison;
 use crate::kernel::{Smoothing, with_kernel};
-use crate::particles::{ParticleKind, Particles, of_solids};
+use crate::particles::{ParticleKind, Particles, Place, of_solids};
 use crate::settings::Settings;
 
 /// Of tr α over D: below it a particle is at the surface if nothing lies before it.
@@ -48,25 +48,6 @@ const IN_FRONT: f64 = 1e-3;
 
 /// At how many depths, up to the support's radius, it is known what there can be in front.
 const FRONTS: usize = 65;
-
-/// Where a particle is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Place {
-    #[default]
-    Inside,
-    /// Its support is cut, and it has particles at the surface in it.
-    Near,
-    AtSurface,
-    /// It has no pressure: it flies, but for what others push it with.
-    Isolated,
-}
-
-impl Place {
-    /// Whether part of what surrounds it is air.
-    pub fn sees_air(self) -> bool {
-        matches!(self, Self::Near | Self::AtSurface)
-    }
-}
 
 /// What the surface of one frame is.
 #[derive(Debug, Default)]

@@ -14,9 +14,9 @@ use crate::base::{exact_sums, parallel};
 use crate::boundary::{PressureRule, conditions, extrapolate_scalar};
 use crate::discretisation::{Laplacian, LaplacianAndItsSum, LaplacianDiagonal};
 use crate::frame::Frame;
-use crate::particles::Particles;
+use crate::particles::{Particles, Place};
 use crate::settings::{Eigenvalues, Settings, Solver};
-use crate::surface::{Place, Surface};
+use crate::surface::Surface;
 use multigrid::Multigrid;
 
 pub use row::Row;

@@ -4,7 +4,7 @@ use super::errors::array_error;
 use crate::base::{Matrix, Vector};
 use crate::loads::Load;
 use crate::motion::{NUMBERS, Pose};
-use crate::particles::{ParticleKind, Particles, each_array};
+use crate::particles::{ParticleKind, Particles, Place, each_array};
 use crate::report::{Clock, Column, Report, columns};
 use crate::settings::Body;
 use crate::simulation::Simulation;
@@ -79,10 +79,11 @@ pub(super) fn read_particles<const D: usize>(state: &Bound<'_, PyDict>) -> PyRes
     let count = read_rows::<D>(state, "position", None)?.len();
     let mut particles = Particles { real: count, ..Particles::default() };
     each_array!(particles, (&mut) array, name => {
-        if name != "id" || state.contains(name)? {
+        if !["id", "place"].contains(&name) || state.contains(name)? {
             *array = Exchanged::read(state, name, count)?;
         }
     });
+    particles.place.resize(count, Place::default());
     if particles.id.is_empty() {
         particles.id = (0..count as u64).collect();
     }
@@ -115,7 +116,12 @@ pub(super) fn state<'py, const D: usize>(py: Python<'py>, simulation: &Simulatio
         let numbers = PyArray1::from_iter(py, poses.iter().flat_map(Pose::numbers));
         dict.set_item("pose", numbers.reshape([poses.len(), NUMBERS])?)?;
     }
-    each_array!(particles, (&) array, name => dict.set_item(name, Exchanged::write(py, &array[..particles.real]))?);
+    let has_surface = simulation.settings().free_surface.is_some();
+    each_array!(particles, (&) array, name => {
+        if name != "place" || has_surface {
+            dict.set_item(name, Exchanged::write(py, &array[..particles.real]))?;
+        }
+    });
     dict.set_item("time", clock.time)?;
     dict.set_item("step", clock.step)?;
     dict.set_item("mass_in", clock.mass_in)?;
@@ -202,15 +208,20 @@ macro_rules! exchange_as_it_is {
 }
 exchange_as_it_is!(f64 u16 u64);
 
-impl Exchanged for ParticleKind {
-    fn write<'py>(py: Python<'py>, values: &[Self]) -> Bound<'py, PyAny> {
-        PyArray1::from_iter(py, values.iter().map(|&kind| kind as u8)).into_any()
-    }
+macro_rules! exchange_as_numbers {
+    ($($named:ty)*) => {
+        $(impl Exchanged for $named {
+            fn write<'py>(py: Python<'py>, values: &[Self]) -> Bound<'py, PyAny> {
+                PyArray1::from_iter(py, values.iter().map(|&value| value as u8)).into_any()
+            }
 
-    fn read(state: &Bound<'_, PyDict>, name: &'static str, count: usize) -> PyResult<Vec<Self>> {
-        Ok(read_array::<u8>(state, name, count)?.into_iter().map(Self::try_from).collect::<Result<_, _>>()?)
-    }
+            fn read(state: &Bound<'_, PyDict>, name: &'static str, count: usize) -> PyResult<Vec<Self>> {
+                Ok(read_array::<u8>(state, name, count)?.into_iter().map(Self::try_from).collect::<Result<_, _>>()?)
+            }
+        })*
+    };
 }
+exchange_as_numbers!(ParticleKind Place);
 
 impl<const D: usize> Exchanged for Vector<D> {
     fn write<'py>(py: Python<'py>, values: &[Self]) -> Bound<'py, PyAny> {

@@ -41,6 +41,11 @@ pub trait Scheme<const D: usize>: Send + Sync {
     /// ∇²u of particle `i` as the viscous term of the step had it.
     fn viscous_laplacian(&self, step: Step, i: usize) -> Vector<D>;
 
+    /// What parts of the step have taken of the energy; no numbers where the scheme does not tell.
+    fn taken(&self, _step: Step, _flow: &Flow<D>) -> Taken {
+        Taken::default()
+    }
+
     /// r_AL of a step so long: c² Δt, c being the speed of the waves by which the scheme keeps ∇·u small.
     fn penalty(&self, time_step: f64) -> f64;
 
@@ -69,6 +74,27 @@ pub fn build<const D: usize>(settings: &Settings) -> Box<dyn Scheme<D>> {
             let coefficient = diffusion_coefficient / 8.0;
             Box::new(WeaklyCompressible::new(settings, sound_speed, DensityDiffusion::Molteni, coefficient))
         }
+    }
+}
+
+/// What parts of a step beside the viscous term take of kinetic and potential energy, in unit time.
+#[derive(Clone, Copy, Debug)]
+pub struct Taken {
+    /// The artificial viscosity.
+    pub artificial: f64,
+    /// The penalty's gradient of ALSPH.
+    pub penalty: f64,
+    /// The pressure's gradient: what bodies do is in it, too.
+    pub pressure: f64,
+    pub sweeps: f64,
+    /// What comes too near to solids.
+    pub contact: f64,
+}
+
+impl Default for Taken {
+    fn default() -> Self {
+        let unknown = f64::NAN;
+        Self { artificial: unknown, penalty: unknown, pressure: unknown, sweeps: unknown, contact: unknown }
     }
 }
 

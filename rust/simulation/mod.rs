@@ -15,8 +15,8 @@ use crate::frame::Travel;
 use crate::interpolation::interpolate;
 use crate::loads::loads;
 use crate::motion::{NUMBERS, Pose};
-use crate::particles::{ParticleKind, Particles};
-use crate::report::{Clock, Report, dissipation, potential_energy};
+use crate::particles::{ParticleKind, Particles, Place};
+use crate::report::{Clock, Report, angular_momentum, dissipation, potential_energy};
 use crate::scheme::{self, Outcome, Scheme};
 use crate::settings::Settings;
 use crate::shifting::{Change, measures_divergence, shift};
@@ -28,6 +28,9 @@ use std::time::{Duration, Instant};
 
 /// The adaptive time step may not fall below this fraction of the user's: by then the velocity has blown up.
 const SMALLEST_TIME_STEP: f64 = 1e-4;
+
+/// Share of the speed of a particle that is alone in the air which counts in the time step.
+const ALONE: f64 = 0.25;
 
 /// Particles are put into cell order once in so many steps, for speed: no result depends on their order.
 const STEPS_BETWEEN_SORTS: u64 = 16;
@@ -168,11 +171,11 @@ impl<const D: usize> Simulation<D> {
         let Flow { particles, motion, .. } = &mut self.flow;
         let is_first = self.clock.step == 0;
         motion.start(&self.settings, particles, &mut self.forcing.motion, self.clock.time, is_first)?;
-        let velocity_max = self.velocity_max();
+        let [fastest, velocity_max] = self.velocity_max();
         let time_step = self.time_step(velocity_max)?;
         let fraction = self.settings.derivative_frame.fraction();
         self.flow.motion.advance(&mut self.forcing.motion, self.clock.time, time_step, fraction)?;
-        self.prepare_step(Travel { time_step, velocity_max, fraction });
+        self.prepare_step(Travel { time_step, velocity_max: fastest, fraction });
         let step = Step { settings: &self.settings, time_step, velocity_max };
         let (flow, scheme) = (&mut self.flow, &mut self.scheme);
         if step.settings.free_surface.is_some() {
@@ -192,7 +195,8 @@ impl<const D: usize> Simulation<D> {
         flow.motion.feel(flow.body_force.constant(), |i| flow.body_force.varying(i));
 
         let solved = scheme.solve(step, flow);
-        if let Some(symptom) = breakdown::find(step.settings, &flow.particles, &flow.frame, time_step) {
+        let is_alone = |i: usize| flow.surface.place.get(i) == Some(&Place::Isolated);
+        if let Some(symptom) = breakdown::find(step.settings, &flow.particles, &flow.frame, is_alone, time_step) {
             let error = self.diverged(symptom, time_step, velocity_max);
             self.failed = Some(self.flow.restore());
             self.prepared = false;
@@ -201,8 +205,9 @@ impl<const D: usize> Simulation<D> {
         let pressure = |s: usize| scheme.pressure_force(step, flow, s);
         let loads = loads(step.settings, &flow.particles, &flow.frame, &flow.walls, &flow.motion, pressure);
         let dissipated = dissipation(step, flow, &loads, |i| scheme.viscous_laplacian(step, i));
-        let mut report = Report::new(step, &flow.particles, &flow.frame.stencil, scheme.penalty(time_step), loads);
+        let mut report = Report::new(step, flow, scheme.penalty(time_step), loads);
         report.dissipation = dissipated;
+        report.taken = scheme.taken(step, flow);
         flow.advance_positions(step); // (12)
         report.potential_energy = potential_energy(step, flow);
         flow.walls.see_for_shift(step.settings, &flow.particles, &flow.frame);
@@ -218,6 +223,7 @@ impl<const D: usize> Simulation<D> {
         report.poses = self.flow.motion.poses();
         report.clock = self.clock;
         report.counts = self.flow.particles.counts();
+        report.angular_momentum = angular_momentum(&self.settings, &self.flow.particles);
         report.places = self.flow.surface.counts();
         self.history.push(report);
         Ok(())
@@ -228,9 +234,9 @@ impl<const D: usize> Simulation<D> {
         if self.prepared {
             return;
         }
-        let velocity_max = self.velocity_max();
+        let [fastest, velocity_max] = self.velocity_max();
         let time_step = self.time_step(velocity_max).unwrap_or(self.settings.time_step);
-        self.search(Travel { time_step, velocity_max, fraction: 0.0 });
+        self.search(Travel { time_step, velocity_max: fastest, fraction: 0.0 });
         self.prepared = true;
     }
 
@@ -250,6 +256,9 @@ impl<const D: usize> Simulation<D> {
     /// Boundary crossings and clock. Returns how many particles come back in the buffers of outlets.
     fn end_step(&mut self, time_step: f64) -> usize {
         self.flow.particles.drop_images();
+        if self.settings.free_surface.is_some() {
+            self.flow.particles.place.copy_from_slice(&self.flow.surface.place);
+        }
         self.flow.particles.go_round(&self.settings.bodies);
         let flow = boundary::end_step(&mut self.flow.particles, &self.settings, &self.flow.frame.grid, time_step);
         self.clock.mass_in += flow.inflow;
@@ -260,11 +269,14 @@ impl<const D: usize> Simulation<D> {
         flow.returning
     }
 
-    /// Largest velocity modulus of the particles: what u_max stands for in r_AL and in the stability law.
-    fn velocity_max(&self) -> f64 {
-        let velocity = &self.flow.particles.velocity[..self.flow.particles.real];
-        let largest = |range: Range<usize>| velocity[range].iter().map(|u| u.norm_squared()).fold(0.0, f64::max);
-        parallel::reduce(velocity.len(), largest, f64::max).unwrap_or(0.0).sqrt()
+    /// Largest velocity modulus of the particles, and the largest as they count in the time step: what u_max stands for in r_AL and in
+    /// the stability law.
+    fn velocity_max(&self) -> [f64; 2] {
+        let particles = &self.flow.particles;
+        let larger = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])];
+        let speeds = |i: usize| [particles.velocity[i].norm(), counting_speed(particles, i)];
+        let largest = |range: Range<usize>| range.map(speeds).fold([0.0; 2], larger);
+        parallel::reduce(particles.real, largest, larger).unwrap_or_default()
     }
 
     /// Δt of the next step.
@@ -280,9 +292,9 @@ impl<const D: usize> Simulation<D> {
         let limits = self.scheme.limits(settings, velocity_max);
         let fastest_waves = limits.courant.min(settings.time_step_safety * limits.penalty).min(limits.acoustic);
         if fastest_waves < SMALLEST_TIME_STEP * settings.time_step {
-            let velocity = &self.flow.particles.velocity[..self.flow.particles.real];
-            let fastest =
-                (0..velocity.len()).max_by(|&a, &b| velocity[a].norm_squared().total_cmp(&velocity[b].norm_squared()));
+            let particles = &self.flow.particles;
+            let speed = |i: usize| counting_speed(particles, i);
+            let fastest = (0..particles.real).max_by(|&a, &b| speed(a).total_cmp(&speed(b)));
             let symptom = Symptom { particle: fastest.unwrap_or(0), field: "velocity", value: velocity_max };
             return Err(self.diverged(symptom, fastest_waves, velocity_max));
         }
@@ -370,6 +382,13 @@ impl<const D: usize> Simulation<D> {
         inlet.sort_unstable_by_key(|&i| particles.id[i]);
         inlet
     }
+}
+
+/// What the speed of a particle counts in the time step. One that is alone in the air has no pressure, and may cross a spacing in a step:
+/// a drop of a splash does not hold up the others.
+fn counting_speed<const D: usize>(particles: &Particles<D>, i: usize) -> f64 {
+    let share = if particles.place[i] == Place::Isolated { ALONE } else { 1.0 };
+    share * particles.velocity[i].norm()
 }
 
 /// Fields derived from the particles at one time.

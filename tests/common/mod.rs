@@ -2,7 +2,7 @@
 #![allow(dead_code)] // not every test uses every helper
 
 use alsph::settings::Settings;
-use alsph::{ParticleKind, Particles, Vector};
+use alsph::{ParticleKind, Particles, Place, Vector};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use std::f64::consts::{PI, TAU};
@@ -67,6 +67,7 @@ pub fn particles<const D: usize>(points: Vec<Vector<D>>) -> Particles<D> {
         body: vec![0; count],
         normal: vec![Vector::zeros(); count],
         depth: vec![0.0; count],
+        place: vec![Place::Inside; count],
         id: (0..count as u64).collect(),
     }
 }

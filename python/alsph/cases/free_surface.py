@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
+from alsph.analysis.energy import PARTS, energy, taken
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
 from alsph.analysis.sampling import pressure_on_walls
@@ -31,6 +32,9 @@ SIDES = ("slip", "periodic", "air", "none")
 
 ENERGY = "largest rise of the energy over its start"
 """Name of the measure of what energy was made."""
+
+TAKEN = "share of the energy lost to "
+"""Names of the measures of what energy was lost begin so."""
 
 GRAVITY = 9.81
 """That of the earth [m/s²]."""
@@ -147,7 +151,7 @@ class FreeSurface(Case):
     settles: ClassVar[bool] = False
     picture_axis: ClassVar[str] = "y"
     idle: ClassVar[tuple[str, ...]] = ("tolerance", "viscous_theta", "wall_pressure", "laplacian_correction")
-    later_names: ClassVar[tuple[str, ...]] = (ENERGY,)
+    later_names: ClassVar[tuple[str, ...]] = (ENERGY, *(f"{TAKEN}{name}" for name in PARTS))
     usual_sound_speed: ClassVar[float] = 20.0
     gravity: ClassVar[bool] = True
     """Whether the body force (0, −1), in 3-D (0, 0, −1), acts."""
@@ -287,11 +291,13 @@ class FreeSurface(Case):
     def energy_measures(self, run: Record) -> list[Measure]:
         """Return the largest rise of kinetic and potential energy above their least value before, over their start.
 
-        None where a force that depends on time or bodies that move do work, too.
+        And what each part of a step has taken of it, if the history tells. None where a force that depends on time or
+        bodies that move do work, too.
         """
         moved = "forcing" in self.rules or any(body.moves or body.rigid for body in self.checked_bodies)
         if moved or not len(run.history.get("potential_energy", [])):
             return []
-        energy = run.history["kinetic_energy"] + run.history["potential_energy"]
-        rise = (energy - np.minimum.accumulate(energy)).max() / energy[0]
-        return [Measure(ENERGY, float(rise), 0.0, 0.01, "energy is only lost")]
+        total = energy(run.history)
+        rise = (total - np.minimum.accumulate(total)).max() / total[0]
+        lost = [Measure(TAKEN + name, float(part[-1] / total[0])) for name, part in taken(run.history).items()]
+        return [Measure(ENERGY, float(rise), 0.0, 0.01, "energy is only lost"), *lost]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import alsph._alsph as _alsph
-from alsph.arrays import FloatArray
+from alsph.arrays import AXES, FloatArray
 from alsph.engine.motion import answering_poses, is_rigid
 from alsph.engine.prescribed import Prescription, Rule, answering, backflow
 from alsph.engine.problem import Problem
@@ -63,6 +63,7 @@ TYPES: dict[str, tuple[type[np.generic], int]] = {
     "body": (np.uint16, 1),
     "normal": (np.float64, 2),
     "depth": (np.float64, 1),
+    "place": (np.uint8, 1),
     "id": (np.uint64, 1),
     "pose": (np.float64, 2),
 }
@@ -73,6 +74,16 @@ OF_BODIES = {"pose"}
 
 MOTION = ("displacement", "velocity", "angle", "angular_velocity")
 """Columns of the history that tell how bodies move."""
+
+
+OF_SURFACES = (
+    *(f"{part}_dissipation" for part in ("artificial", "penalty", "pressure", "sweep", "contact")),
+    *(f"angular_momentum_{axis}" for axis in AXES),
+)
+"""Columns of the history of a fluid with a free surface."""
+
+NOT_OF_PLANES = ("angular_momentum_x", "angular_momentum_y")
+"""Those that say nothing in 2-D."""
 
 
 @contextmanager
@@ -331,8 +342,11 @@ class Simulation:
         """
         with self._engine() as engine:
             rows = engine.take_history()
-        if not any(is_rigid(body) for body in self.problem.settings["bodies"]):
-            rows = {name: values for name, values in rows.items() if name not in MOTION}
+        settings = self.problem.settings
+        left_out: tuple[str, ...] = () if any(is_rigid(body) for body in settings["bodies"]) else MOTION
+        left_out += NOT_OF_PLANES if self.problem.dimensions == 2 else ()
+        left_out += () if settings.get("free_surface") else OF_SURFACES
+        rows = {name: values for name, values in rows.items() if name not in left_out}
         rows = {"step": rows["step"], **rows, **self._coefficients(rows)}
         if keep and len(rows["step"]):
             self._history.append(rows)

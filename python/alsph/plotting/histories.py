@@ -9,6 +9,7 @@ import numpy as np
 
 from alsph.analysis import averages
 from alsph.analysis.averages import Window
+from alsph.analysis.energy import taken
 from alsph.analysis.window import DEVELOPING
 from alsph.arrays import FloatArray
 from alsph.plotting.style import PALETTE, TIME_LABEL, blank, line
@@ -141,23 +142,22 @@ def ledger(run: Run) -> Figure:
     fluid, mass = history.get("fluid", empty), history.get("mass_in", empty) - history.get("mass_out", empty)
     surface, potential = (history.get(name, empty) for name in ("surface", "potential_energy"))
     volume = ("relative change", {"volume": ledger.volume_drift, "volume over exact": ledger.volume_error})
-    energy = {"kinetic energy": ledger.kinetic_energy}
-    if has_surface(history):  # then every particle has its volume
+    energy, parts = {"kinetic energy": ledger.kinetic_energy}, taken(history)
+    change = {"fluid particles": fluid / fluid[:1] - 1, "mass in - out": mass / history.get("volume", empty)[:1]}
+    if has_surface(history):
         volume = ("share of the fluid", {"at the surface": surface / fluid, "alone": history["isolated"] / fluid})
+        change |= {"volume": ledger.volume_drift}
         if np.any(run.config.case.body_force()):
             energy |= {"potential energy": potential, "both": ledger.kinetic_energy + potential}
     panels: list[tuple[str, dict[str, FloatArray]]] = [
         (r"$|\nabla\cdot\mathbf{u}|\,D/U$", {"largest": ledger.divergence_max, "mean": ledger.divergence_mean}),
         volume,
         ("iterations", {"inner iterations of a step": ledger.iterations}),
-        (
-            "relative change",
-            {"fluid particles": fluid / fluid[:1] - 1, "mass in - out": mass / history.get("volume", empty)[:1]},
-        ),
+        ("relative change", change),
         (r"$\Delta tU/\Delta x$", {"time step": history.get("time_step", empty) / run.spacing}),
         (r"$E\,/\,\rho U^2\,D^d$", energy),
         ("$u_{max}/U$", {"largest velocity": history.get("velocity_max", empty)}),
-        (r"$\dot E\,D/U\,/\,\rho U^2\,D^d$", {}),
+        (r"taken of $E\,/\,\rho U^2\,D^d$", parts) if parts else (r"$\dot E\,D/U\,/\,\rho U^2\,D^d$", {}),
     ]
     figure = blank(12, 8.5)
     grid = figure.subplots(4, 2, sharex=True)
@@ -169,7 +169,7 @@ def ledger(run: Run) -> Figure:
             _energy_budget(axes, run.ledger)
         elif "nabla" in label:
             axes.set_yscale("log")
-        elif "change" not in label:
+        elif "change" not in label and "taken" not in label:
             axes.set_ylim(0, 1.1 * axes.dataLim.ymax if run.history["time"].size else None)
         _finish(axes, run.window if run.config.case.settles else None)
     for axes in grid[-1]:

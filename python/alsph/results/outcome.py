@@ -1,12 +1,14 @@
 """How a run ended, in words, as those of :mod:`alsph.cases.remarks`."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
 from alsph.analysis.window import Window
 from alsph.arrays import FloatArray
+from alsph.cases.free_surface import ENERGY
 
 DIVERGENCE = 0.02
 """Mean |∇·u| [U/D] above which it is remarked upon; runs with the defaults have 1e-4 to 5e-3 (docs/results.md)."""
@@ -59,6 +61,16 @@ def unsettled(window: Window, least_periods: int = FEW_PERIODS) -> list[str]:
 def has_surface(history: Mapping[str, FloatArray]) -> bool:
     """Whether particles have been at a free surface; what an older version has not recorded is NaN."""
     return bool(np.nan_to_num(history.get("surface", np.empty(0))).any())
+
+
+def made(measures: Iterable[Measure]) -> list[str]:
+    """Remark on energy that a step has made, if a run's measures tell of more than is borne."""
+    return [
+        f"energy made: kinetic and potential energy rise by {100 * measure.value:.2g} % of their start, and nothing in "
+        "the flow gives it; smaller steps (courant) or a finer resolution make less"
+        for measure in measures
+        if measure.name == ENERGY and measure.value > measure.tolerance
+    ]
 
 
 def lost(run: Record) -> list[str]:

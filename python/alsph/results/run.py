@@ -27,7 +27,7 @@ from alsph.results.dimensional import dimensional
 from alsph.results.export import Grid
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.loads import Loads
-from alsph.results.outcome import outcome, unsolved
+from alsph.results.outcome import made, outcome, unsolved
 from alsph.text import duration, in_figure, printable, shown
 from alsph.units import Units
 
@@ -125,7 +125,13 @@ class Run(Loads):
         """
         case = self.config.case
         solved = unsolved(self, case.residual_tolerance, case.most_iterations)
-        found = [*outcome(self, self.config.until_in_words), *solved, *self._judged[1], *case.remarks()]
+        found = [
+            *outcome(self, self.config.until_in_words),
+            *solved,
+            *made(self.measures),
+            *self._judged[1],
+            *case.remarks(),
+        ]
         return [self.symbols(remark) for remark in found]
 
     @property

@@ -12,11 +12,10 @@ use super::{Pressure, Terms};
 use crate::boundary::{VelocityRule, conditions};
 use crate::discretisation::{AdjointGradient, Divergence};
 use crate::flow::{Flow, Step};
-use crate::particles::{ParticleKind, Particles};
+use crate::particles::{ParticleKind, Particles, Place};
 use crate::scheme::Solved;
 use crate::scheme::projection::Sweeps;
 use crate::settings::{Eigenvalues, Settings};
-use crate::surface::Place;
 
 #[derive(Debug)]
 pub struct Penalty {

@@ -14,12 +14,12 @@ use super::{Pressure, Terms};
 use crate::base::{Vector, parallel};
 use crate::discretisation::Divergence;
 use crate::flow::{Flow, Step};
+use crate::particles::Place;
 use crate::poisson::{Poisson, System};
 use crate::scheme::Solved;
 use crate::scheme::isph::Solve;
 use crate::scheme::projection::Sweeps;
 use crate::settings::{Eigenvalues, Settings};
-use crate::surface::Place;
 
 #[derive(Debug)]
 pub struct Solution<const D: usize> {

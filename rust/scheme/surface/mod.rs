@@ -13,6 +13,7 @@
 //! gradients of w q its mean, of p its mean continued with the hydrostatic slope. The viscous term sees the wall's velocity by its rule.
 
 mod alsph;
+mod energy;
 mod friction;
 mod isph;
 mod solids;
@@ -24,14 +25,14 @@ use crate::discretisation::{AdjointGradient, ConservativeGradient, Divergence, L
 use crate::flow::{Flow, Step};
 use crate::frame::Frame;
 use crate::loads::pairs;
-use crate::particles::{ParticleKind, Particles, of_solids};
+use crate::particles::{ParticleKind, Particles, Place, of_solids};
 use crate::scheme::isph::Solve;
 use crate::scheme::projection::{Sweeps, weight};
-use crate::scheme::{Derived, Scheme, Solved};
+use crate::scheme::{Derived, Scheme, Solved, Taken};
 use crate::settings::{
     DensityDiffusion, Eigenvalues, FreeSurface, PressureGradient, SchemeSettings, Settings, TimeStepLimits,
 };
-use crate::surface::{Place, Surface};
+use crate::surface::Surface;
 
 use alsph::Penalty;
 use isph::Solution;
@@ -101,8 +102,10 @@ pub struct Terms<const D: usize> {
     /// w q, and u as the divergence sees it, if there are solids.
     pushed: Vec<f64>,
     mirrored: Vec<Vector<D>>,
-    /// u*.
+    /// u*, what the pressure has made of it, and what sweeps have of that.
     velocity_star: Vec<Vector<D>>,
+    corrected: Vec<Vector<D>>,
+    swept: Vec<Vector<D>>,
     /// ∇²p with air beyond the surface.
     pressure_laplacian: Vec<f64>,
     /// What all but the viscous term gives to solids.
@@ -123,6 +126,8 @@ impl<const D: usize> Terms<D> {
             pushed: Vec::new(),
             mirrored: Vec::new(),
             velocity_star: Vec::new(),
+            corrected: Vec::new(),
+            swept: Vec::new(),
             pressure_laplacian: Vec::new(),
             reaction: Vec::new(),
         }
@@ -302,6 +307,7 @@ impl<const D: usize> Terms<D> {
             }
         }
         frame.images.fill(velocity);
+        self.corrected.clone_from(velocity);
         let Flow { particles: Particles { real, pressure, .. }, frame, surface, .. } = &*flow;
         let own = |f: usize| {
             let f = frame.images.source(*real, f);
@@ -415,6 +421,7 @@ impl<const D: usize, P: Pressure<D>> Scheme<D> for BesideSurface<D, P> {
     fn solve(&mut self, step: Step, flow: &mut Flow<D>) -> Solved {
         self.terms.begin(step, flow);
         let solved = self.pressure.advance(&mut self.terms, step, flow);
+        self.terms.swept.clone_from(&flow.particles.velocity);
         self.terms.hold(step, flow);
         self.terms.measure_divergence(step, flow);
         if !step.settings.bodies.is_empty() {
@@ -437,6 +444,10 @@ impl<const D: usize, P: Pressure<D>> Scheme<D> for BesideSurface<D, P> {
 
     fn viscous_laplacian(&self, _: Step, i: usize) -> Vector<D> {
         self.terms.derived[i].laplacian
+    }
+
+    fn taken(&self, step: Step, flow: &Flow<D>) -> Taken {
+        self.terms.taken(step, flow)
     }
 
     fn penalty(&self, time_step: f64) -> f64 {

@@ -14,10 +14,9 @@ use crate::base::{Vector, parallel};
 use crate::boundary::extrapolate_vector;
 use crate::discretisation::{Divergence, Gradient};
 use crate::flow::{Flow, Step};
-use crate::particles::ParticleKind;
+use crate::particles::{ParticleKind, Place};
 use crate::scheme::Solved;
 use crate::settings::{DensityDiffusion, Settings};
-use crate::surface::Place;
 
 #[derive(Debug)]
 pub struct Sound<const D: usize> {
