@@ -80,7 +80,7 @@ fn stages(criterion: &mut Criterion) {
             });
         });
         group.bench_function(BenchmarkId::new("breakdown", count), |b| {
-            b.iter(|| assert!(breakdown::find(&settings, &particles, &frame, settings.time_step).is_none()));
+            b.iter(|| assert!(breakdown::find(&settings, &particles, &frame, &[], settings.time_step).is_none()));
         });
         group.bench_function(BenchmarkId::new("velocity gradient", count), |b| {
             b.iter(|| {

@@ -2,9 +2,10 @@
 
 A square of 12 x 12 particles at rest in a tank of mirrors or of solids, without gravity; each velocity and pressure is
 disturbed in turn, and what a step makes of it is a column of the matrix. No modulus may be above 1, but for single
-precision.
+precision. With `--weight` gravity acts, and the pressure is that of depth.
 """
 
+import argparse
 import itertools
 from typing import Any, ClassVar
 
@@ -40,9 +41,16 @@ class Square(FreeSurface):
         """Return the square on its floor."""
         cells = cell_centres(SIDE, 1 / SIDE)
         position = lattice(cells, cells)
-        fluid = self.fluid(position, np.zeros_like(position), np.zeros(len(position)))
+        pressure = 1 - position[:, 1] if self.gravity else np.zeros(len(position))
+        fluid = self.fluid(position, np.zeros_like(position), pressure)
         tank = walls(shapely.box(0, 0, 1, 2), 1 / SIDE, self.support_layers)
         return join(fluid, tank.particles()) if self.solids else fluid
+
+
+class Heavy(Square):
+    """The same with its weight."""
+
+    gravity: ClassVar[bool] = True
 
 
 def radius(case: Square, disorder: float) -> float:
@@ -69,11 +77,14 @@ def radius(case: Square, disorder: float) -> float:
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--weight", action="store_true", help="with gravity")
+    model = Heavy if parser.parse_args().weight else Square
     for scheme, solids, gradient, disorder in itertools.product(
-        Square.schemes(), (False, True), ("adjoint", "conservative"), (0.0, 0.1)
+        model.schemes(), (False, True), ("adjoint", "conservative"), (0.0, 0.1)
     ):
         # What a solve leaves is no linear function of the state.
         own = {"solver_tolerance": 1e-12} if scheme == "isph" else {}
-        case = Square(resolution=SIDE, solids=solids, pressure_gradient=gradient, scheme=scheme, **own)
+        case = model(resolution=SIDE, solids=solids, pressure_gradient=gradient, scheme=scheme, **own)
         told = f"{scheme:13} {'solids' if solids else 'mirrors':8} {gradient:13} disorder {disorder:g}"
         print(f"{told}: radius - 1 = {radius(case, disorder) - 1:.1e}", flush=True)

@@ -4,7 +4,7 @@ use crate::base::Vector;
 use crate::base::parallel::CHUNK;
 use crate::frame::Frame;
 use crate::kernel::{Smoothing, with_kernel};
-use crate::particles::{ParticleKind, Particles};
+use crate::particles::{ParticleKind, Particles, Place};
 use crate::settings::{Body, Boundary, Settings, TimeStepLimits};
 use rayon::prelude::*;
 
@@ -29,12 +29,12 @@ pub struct Symptom {
 
 /// The first particle, if any, that has a value that is not finite, would cross more than Δx in a step, is faster than the
 /// velocity limit and not alone in the air, has left the domain through a wall, has gone into a body, or has no neighbours,
-/// or too few for a gradient.
+/// or too few for a gradient. `place` is of real particles beside a free surface, empty where there is none.
 pub fn find<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
     frame: &Frame<D>,
-    is_alone: impl Fn(usize) -> bool + Sync,
+    place: &[Place],
     time_step: f64,
 ) -> Option<Symptom> {
     let volume = &frame.stencil.volume;
@@ -57,7 +57,8 @@ pub fn find<const D: usize>(
         }
         let speed = particles.velocity[i].norm();
         // A drop of a splash is no sign of a breakdown, however fast it is.
-        let fastest = if is_alone(i) { settings.particle_spacing / time_step } else { fastest };
+        let is_alone = place.get(i) == Some(&Place::Isolated);
+        let fastest = if is_alone { settings.particle_spacing / time_step } else { fastest };
         if speed.is_nan() || speed > fastest {
             return symptom("velocity", speed);
         }

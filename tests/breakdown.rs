@@ -3,7 +3,7 @@
 use alsph::breakdown::{Symptom, find, likely_cause};
 use alsph::kernel::{QuinticSpline, Smoothing};
 use alsph::settings::TimeStepLimits;
-use alsph::{ParticleKind, Particles, Settings, Vector};
+use alsph::{ParticleKind, Particles, Place, Settings, Vector};
 use common::set::Set;
 use serde_json::{Value, json};
 
@@ -26,7 +26,7 @@ fn found(value: &Value, time_step: f64, change: impl FnOnce(&mut Set<2>)) -> Opt
     let settings = common::parse(value);
     let mut set = Set::of(common::particles(common::lattice::<2>(SIDE, 0.0)), &settings, false);
     change(&mut set);
-    find(&settings, &set.particles, &set.frame, time_step)
+    find(&settings, &set.particles, &set.frame, &[], time_step)
 }
 
 fn symptom(particle: usize, field: &'static str, value: f64) -> Option<Symptom> {
@@ -52,6 +52,16 @@ fn a_symptom_is_what_is_beyond_its_bound() {
         let fast = found(value, time_step, at_speed(1.001 * fastest)).expect("too fast");
         assert!((fast.particle, fast.field) == (7, "velocity") && (fast.value / fastest - 1.001).abs() < 1e-12, "{fast:?}");
     }
+    // A drop that is alone in the air may be as fast as it will, if it does not cross Δx.
+    let settings = common::parse(&limited);
+    let mut set = Set::of(common::particles(common::lattice::<2>(SIDE, 0.0)), &settings, false);
+    let mut place = vec![Place::Inside; set.particles.real];
+    place[7] = Place::Isolated;
+    let alone = |set: &Set<2>| find(&settings, &set.particles, &set.frame, &place, SPACING / 4.0);
+    at_speed(3.999)(&mut set);
+    assert_eq!(alone(&set), None);
+    at_speed(4.001)(&mut set);
+    assert_eq!(alone(&set).map(|symptom| symptom.field), Some("velocity"));
     let unknown = found(&value, TIME_STEP, at_speed(f64::NAN)).expect("no number");
     assert!(unknown.field == "velocity" && unknown.value.is_nan());
     // The velocity of a solid is prescribed.
@@ -104,7 +114,8 @@ fn fluid_is_lost_three_quarters_of_a_spacing_under_a_surface() {
             particles.normal[i][1] = if i == 4 { -1.0 } else { 1.0 };
         }
         let set = Set::of(particles, &settings, false);
-        let found = find(&settings, &set.particles, &set.frame, TIME_STEP).filter(|symptom| symptom.field == "position");
+        let found =
+            find(&settings, &set.particles, &set.frame, &[], TIME_STEP).filter(|symptom| symptom.field == "position");
         found.map(|symptom| symptom.value / SPACING)
     };
     assert_eq!(at(&[1.74], 4.1), None);

@@ -1,7 +1,6 @@
 //! What is recorded of a step.
 
-use alsph::discretisation::Stencil;
-use alsph::flow::Step;
+use alsph::flow::{Flow, Step};
 use alsph::{Clock, ParticleKind, Particles, Report, Settings, Simulation};
 use approx::assert_relative_eq;
 use serde_json::{Value, json};
@@ -24,12 +23,12 @@ fn a_report_is_that_of_plain_sums() {
         particles.pressure[i] = (3.0 * phase).sin();
     }
     let volume: Vec<f64> = (0..particles.real).map(|i| 0.002 + 0.001 * (5.0 * i as f64).sin()).collect();
-    let mut stencil = Stencil::default();
-    stencil.number_density = volume.iter().map(|volume| 1.0 / volume).collect();
-    stencil.volume.clone_from(&volume);
+    let mut flow = Flow::new(&settings, particles.clone());
+    flow.frame.stencil.number_density = volume.iter().map(|volume| 1.0 / volume).collect();
+    flow.frame.stencil.volume.clone_from(&volume);
     let report = |settings: &Settings| {
         let step = Step { settings, time_step: 0.01, velocity_max: 1.5 };
-        Report::new(step, &particles, &stencil, 0.7, Vec::new())
+        Report::new(step, &flow, 0.7, Vec::new())
     };
     let now = report(&settings);
     let fluid: Vec<_> = (0..particles.real).filter(|&i| particles.kind[i] == ParticleKind::Fluid).collect();

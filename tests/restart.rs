@@ -3,7 +3,7 @@
 
 use alsph::forcing::Rule;
 use alsph::motion::{MotionRule, Pose};
-use alsph::{Clock, ParticleKind, Particles, Simulation, Vector};
+use alsph::{Clock, ParticleKind, Particles, Place, Simulation, Vector};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::collections::HashSet;
@@ -253,6 +253,7 @@ fn particles<const D: usize>(configuration: &Configuration, side: i64, spacing: 
     }
     particles.real = particles.position.len();
     particles.id = (0..particles.real as u64).collect();
+    particles.place = vec![Place::Inside; particles.real];
     particles
 }
 

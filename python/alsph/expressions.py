@@ -2,25 +2,50 @@
 
 import ast
 from collections.abc import Mapping
-from typing import Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from alsph.arrays import FloatArray
 from alsph.text import shown
 
-FUNCTIONS = {
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+
+@lru_cache
+def _through(*table: float) -> tuple["CubicSpline", FloatArray]:
+    """Return the cubic spline through a table t0, v0, t1, v1 ..., and its first and last t."""
+    from scipy.interpolate import CubicSpline  # half a second that most commands do without
+
+    at, values = np.array(table[::2], float), np.array(table[1::2], float)
+    if not (np.isfinite(at).all() and np.isfinite(values).all() and (np.diff(at) > 0).all()):
+        raise ValueError("spline: the table is to have finite numbers, and its times to increase")
+    return CubicSpline(at, values), at[[0, -1]]
+
+
+def spline(t: FloatArray, *table: float) -> FloatArray:
+    """Return what a table t0, v0, t1, v1 ... has at t: a cubic spline through it, straight on beyond its ends."""
+    if not all(np.ndim(number) == 0 for number in table):
+        raise ValueError("spline: the table is to have numbers, not places")
+    curve, ends = _through(*map(float, table))
+    inside = np.clip(t, *ends)
+    return np.asarray(curve(inside) + curve(inside, 1) * (t - inside))
+
+
+FUNCTIONS: dict[str, Any] = {
     name: getattr(np, name)
     for name in (
         *("sin", "cos", "tan", "arcsin", "arccos", "arctan", "arctan2", "hypot", "sinh", "cosh", "tanh"),
         *("exp", "log", "sqrt", "abs", "sign", "floor", "minimum", "maximum", "where"),
     )
-}
-"""What an expression may call: functions of numpy, element by element."""
+} | {"spline": spline}
+"""What an expression may call: functions of numpy, element by element, and tables."""
 
 CONSTANTS = {"pi": np.pi, "e": np.e}
 
-LONGEST = 2000
+LONGEST = 20_000
 """Characters."""
 
 ALLOWED = (
@@ -107,7 +132,12 @@ class VectorExpression:
                 wrong = bool(node.keywords) or not isinstance(node.func, ast.Name)
                 if isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS:
                     wanted = getattr(FUNCTIONS[node.func.id], "nin", 3)
-                    if len(node.args) != wanted:
+                    if node.func.id == "spline":
+                        if len(node.args) < 5 or len(node.args) % 2 == 0:
+                            raise ValueError(
+                                "spline takes t and a table of two pairs or more: spline(t, t0, v0, t1, v1)"
+                            )
+                    elif len(node.args) != wanted:
                         raise ValueError(f"{node.func.id} takes {wanted} arguments, not {len(node.args)}")
             if wrong:
                 raise ValueError(f"{shown(ast.unparse(node))} cannot be used in an expression")

@@ -83,7 +83,6 @@ pub(super) fn read_particles<const D: usize>(state: &Bound<'_, PyDict>) -> PyRes
             *array = Exchanged::read(state, name, count)?;
         }
     });
-    particles.place.resize(count, Place::default());
     if particles.id.is_empty() {
         particles.id = (0..count as u64).collect();
     }

@@ -3,13 +3,14 @@
 use crate::base::Vector;
 use crate::base::error::{Error, Result, setting};
 use crate::neighbours::Grid;
-use crate::particles::{ParticleKind, Particles, is_late, lineage};
+use crate::particles::{ParticleKind, Particles, Place, is_late, lineage};
 use crate::settings::{Boundary, Settings};
 
 /// Refuse arrays that cannot be simulated; give solid particles the velocity of their body, if it has one.
 pub(super) fn check_particles<const D: usize>(settings: &Settings, particles: &mut Particles<D>) -> Result<()> {
     let array = |name, problem| Err(Error::Array { name, problem });
     particles.real = particles.len();
+    particles.place.resize(particles.real, Place::default());
     if !particles.kind.contains(&ParticleKind::Fluid) {
         return array("kind", "holds no fluid particle (0)".into());
     }

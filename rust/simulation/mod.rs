@@ -195,8 +195,8 @@ impl<const D: usize> Simulation<D> {
         flow.motion.feel(flow.body_force.constant(), |i| flow.body_force.varying(i));
 
         let solved = scheme.solve(step, flow);
-        let is_alone = |i: usize| flow.surface.place.get(i) == Some(&Place::Isolated);
-        if let Some(symptom) = breakdown::find(step.settings, &flow.particles, &flow.frame, is_alone, time_step) {
+        let place = &flow.surface.place;
+        if let Some(symptom) = breakdown::find(step.settings, &flow.particles, &flow.frame, place, time_step) {
             let error = self.diverged(symptom, time_step, velocity_max);
             self.failed = Some(self.flow.restore());
             self.prepared = false;

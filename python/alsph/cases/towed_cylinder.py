@@ -52,8 +52,26 @@ class TowedCylinder(MovingCylinder):
         return state
 
     def measures(self, run: Record) -> list[Measure]:
-        """Return the mean drag coefficient after the start."""
+        """Return the mean drag coefficient after the start, and its impulse over the momentum that the fluid loses."""
         time, drag = run.history["time"], run.history.get("drag_coefficient", np.empty(0))
         late = time >= START
         mean = float(np.average(drag[late], weights=run.history["time_step"][late])) if late.any() else np.nan
-        return [Measure(f"mean drag coefficient from tU/D = {START:g} on", mean)]
+        balance, source = self._balance(run), "momentum of the fluid between two snapshots"
+        return [
+            Measure(f"mean drag coefficient from tU/D = {START:g} on", mean),
+            Measure("impulse of the drag over what the fluid loses", balance, 1.0, 0.02, source),
+        ]
+
+    def _balance(self, run: Record) -> float:
+        """Nothing but the cylinder acts along the channel, whose walls are slip walls."""
+        times = run.times[run.times >= START]
+        if len(times) < 2:
+            return np.nan
+        momentum = [
+            float(snapshot.velocity[snapshot.kind == Kind.FLUID, 0].sum()) * self.particle_spacing**2
+            for snapshot in (run.snapshot(times[0]), run.snapshot(times[-1]))
+        ]
+        time, step = run.history["time"], run.history["time_step"]
+        force = sum(run.history[f"cylinder_{part}_force_x"] for part in ("pressure", "viscous"))
+        between = (time > times[0]) & (time <= times[-1])
+        return float((force * step)[between].sum() / (momentum[0] - momentum[1]))

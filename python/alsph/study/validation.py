@@ -115,6 +115,7 @@ FULL = (
     Entry("concentric_release", (10, 20, 40), until=0.11, parameters={"density_ratio": 2.0}),
     Entry("rotating_cylinder", (10, 20), until=4.0),
     Entry("oscillating_cylinder", (20, 32), until=15.0),
+    Entry("towed_cylinder", (10, 20), until=6.0),
     Entry("settling_sphere", (8,), until=12.0),
     Entry("dam_break", (20, 40, 80), until=8.0),
     Entry("dam_break", (20, 40), until=2.0, parameters={"length": 0.5}),
