@@ -260,15 +260,20 @@ def test_a_sensor_that_the_water_has_not_met_is_not_drawn(tmp_path):
     assert [profile.name for profile in run.profiles] == ["front"] and Sensors.read(run)[1].shape[0] == 4
 
 
+def compared(run):
+    """The measures that have a reference."""
+    return [measure for measure in run.measures if not np.isnan(measure.reference)]
+
+
 def test_other_columns_and_tanks_have_no_experiment(tmp_path):
     run = cases.DamBreak(resolution=8, length=1.25, tank_length=2.5).run(tmp_path / "run", until=4.0, progress=False)
-    assert [measure.name for measure in run.measures] == ["largest rise of the energy over its start"]
+    assert [measure.name for measure in compared(run)] == ["largest rise of the energy over its start"]
     assert all(not profile.reference[0].size for profile in run.profiles) and len(run.profiles) == 5
 
 
 def test_a_front_is_compared_before_it_meets_the_wall(tmp_path):
     run = cases.DamBreak(resolution=8, length=1.0, tank_length=2.0).run(tmp_path / "run", until=2.5, progress=False)
-    assert [each.name[:24] for each in run.measures] == ["front at t = 1 beside Ma", "largest rise of the ener"]
+    assert [each.name[:24] for each in compared(run)] == ["front at t = 1 beside Ma", "largest rise of the ener"]
     (measured,) = (each.reference for each in run.profiles if each.name == "front, Martin and Moyce (1952)")
     assert measured[1].max() < 2.0
     at_wall = cases.DamBreak(resolution=20, length=0.5, tank_length=2.475).run(
@@ -276,7 +281,7 @@ def test_a_front_is_compared_before_it_meets_the_wall(tmp_path):
     )
     assert not any(each.name.startswith("front at t = 2") for each in at_wall.measures)
     narrow = cases.DamBreak(resolution=8, length=1.0, tank_length=1.05).run(tmp_path / "b", until=0.1, progress=False)
-    assert len(narrow.measures) == 1 and len(narrow.profiles) >= 2
+    assert len(compared(narrow)) == 1 and len(narrow.profiles) >= 2
 
 
 def test_probes_at_walls_do_not_read_below_the_air(tmp_path):
