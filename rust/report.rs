@@ -32,8 +32,9 @@ pub struct Report<const D: usize> {
     pub penalty: f64,
     /// Fluid particles that the sums of this report run over.
     pub fluid: usize,
-    /// Σ V_i and ½ρ Σ V_i u_i² of the fluid; beside a surface V is in the volume what the number density tells of a particle inside.
+    /// Σ V_i of the fluid; beside a surface of 1/Σ W for particles inside, of Δx^D for the others.
     pub volume: f64,
+    /// ½ρ Σ V_i u_i² of the fluid.
     pub kinetic_energy: f64,
     /// ρΔx^D Σ r_i × u_i of the fluid at the end of the step, about the origin.
     pub angular_momentum: [f64; 3],
@@ -133,8 +134,8 @@ pub fn columns<const D: usize>() -> Vec<(&'static str, Column<D>)> {
 }
 
 impl<const D: usize> Report<D> {
-    /// The report of a step whose iteration has ended and whose particles have not yet been shifted; clock, counts, outcome and dissipation
-    /// come after.
+    /// The report of a step whose iteration has ended and whose particles have not yet been shifted; clock, counts, outcome, what is taken of
+    /// the energy, potential energy and angular momentum come after.
     pub fn new(step: Step, flow: &Flow<D>, penalty: f64, loads: Vec<Load<D>>) -> Self {
         let Flow { particles, frame, surface, .. } = flow;
         let undisturbed = step.settings.undisturbed_volume();

@@ -11,12 +11,15 @@ import pytest
 import shapely
 from alsph import Domain, SolidBody, Units, cases, plotting, reference
 from alsph.analysis.energy import PARTS, energy, taken
+from alsph.analysis.measures import Measure
 from alsph.cases.base import VELOCITY_LIMIT
 from alsph.cases.dam_break import column_pressure
+from alsph.cases.free_surface import ENERGY
 from alsph.cases.heave import linear_heave
 from alsph.cases.heaving_cylinder import MASS, SECTION
 from alsph.cases.sloshing import irrotational_level
 from alsph.errors import ConfigError, SolverError
+from alsph.folder.checkpoint import digest
 from alsph.folder.run_folder import OWN
 from alsph.geometry.lattice import cell_centres, lattice
 from alsph.geometry.particles import join
@@ -101,10 +104,10 @@ def test_what_parts_of_a_step_take_of_the_energy_is_what_goes(scheme, gradient, 
     assert moment[-len(told) :] == pytest.approx(told, rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_fast_drop_neither_holds_up_the_others_nor_ends_the_run(scheme):
+@pytest.mark.parametrize(("scheme", "courant"), [*((scheme, 0.2) for scheme in SCHEMES), ("alsph", 0.5)])
+def test_a_fast_drop_neither_holds_up_the_others_nor_ends_the_run(scheme, courant):
     """It flies out through the open top; so fast a particle of the water is a breakdown."""
-    case = cases.StillWater(resolution=10, scheme=scheme)
+    case = cases.StillWater(resolution=10, scheme=scheme, courant=courant)
     state = case.build().state
     highest = int(np.argmax(state["position"][:, 1]))
     state["velocity"][highest] = [0.0, 4 * VELOCITY_LIMIT]
@@ -119,7 +122,48 @@ def test_a_fast_drop_neither_holds_up_the_others_nor_ends_the_run(scheme):
     rows = simulation.history()
     assert rows["isolated"][0] == 1 and rows["mass_out"][-1] == pytest.approx(0.01)
     if not case.is_weakly_compressible:
-        assert rows["time_step"][1] == pytest.approx(4 * rows["time_step"][0])
+        assert rows["time_step"][1] == pytest.approx(0.8 / courant * rows["time_step"][0])
+    # It goes on as it was, which its place is part of.
+    begun = case.restored(state | drop)
+    begun.advance(3)
+    again, forgetful = (case.restored(begun.state()), case.restored(begun.state() | {"place": np.zeros(101, np.uint8)}))
+    for each in (begun, again, forgetful):
+        each.advance(1)
+    assert digest(begun.state()) == digest(again.state())
+    if not case.is_weakly_compressible:
+        assert forgetful.time < begun.time
+    for wrong, told in ((np.full(101, 4, np.uint8), "4 is not 0 inside"), (np.zeros(3, np.uint8), "3 entries")):
+        with pytest.raises(ConfigError, match=told):
+            case.restored(begun.state() | {"place": wrong})
+
+
+def test_place_is_in_the_particles_file_unless_an_older_alsph_began_it(tmp_path):
+    import h5py
+
+    case = cases.StillWater(resolution=8)
+    path = tmp_path / "run"
+    case.run(path, until=0.2, output_interval=0.1, progress=False)
+    with h5py.File(path / "particles.vtkhdf", "a") as file:
+        assert set(np.unique(file["VTKHDF/PointData/place"])) == {0, 1, 2}
+        del file["VTKHDF/PointData/place"], file["VTKHDF/Steps/PointDataOffsets/place"]
+    alsph.resume(path, until=0.4, progress=False)
+    assert len(alsph.open_run(path).times) == 5
+    assert alsph.repeat(path, progress=False).same_state
+
+
+def test_energy_that_is_made_is_told():
+    made = outcome.made([Measure(ENERGY, value, 0.0, 0.01, "") for value in (0.009, 0.02)])
+    assert len(made) == 1 and "2 % of their start" in made[0]
+
+
+def test_an_older_run_that_goes_on_does_not_tell_what_took_its_energy():
+    simulation = cases.DamBreak(resolution=8).simulation()
+    simulation.advance(20)
+    rows = simulation.history()
+    assert taken(rows)
+    assert not taken(
+        rows | {"pressure_dissipation": np.where(np.arange(20) < 10, np.nan, rows["pressure_dissipation"])}
+    )
 
 
 @pytest.mark.parametrize(

@@ -84,10 +84,10 @@ pub struct Taken {
     pub artificial: f64,
     /// The penalty's gradient of ALSPH.
     pub penalty: f64,
-    /// The pressure's gradient: what bodies do is in it, too.
+    /// The pressure's gradient. What bodies do is in it, and in what follows.
     pub pressure: f64,
     pub sweeps: f64,
-    /// What comes too near to solids.
+    /// What is held that comes too near to solids.
     pub contact: f64,
 }
 

@@ -10,7 +10,12 @@ use crate::settings::{Boundary, Settings};
 pub(super) fn check_particles<const D: usize>(settings: &Settings, particles: &mut Particles<D>) -> Result<()> {
     let array = |name, problem| Err(Error::Array { name, problem });
     particles.real = particles.len();
-    particles.place.resize(particles.real, Place::default());
+    if particles.place.is_empty() || settings.free_surface.is_none() {
+        particles.place = vec![Place::Inside; particles.real];
+    }
+    if particles.place.len() != particles.real {
+        return array("place", format!("has {} entries for {} positions", particles.place.len(), particles.real));
+    }
     if !particles.kind.contains(&ParticleKind::Fluid) {
         return array("kind", "holds no fluid particle (0)".into());
     }

@@ -29,8 +29,8 @@ use std::time::{Duration, Instant};
 /// The adaptive time step may not fall below this fraction of the user's: by then the velocity has blown up.
 const SMALLEST_TIME_STEP: f64 = 1e-4;
 
-/// Share of the speed of a particle that is alone in the air which counts in the time step.
-const ALONE: f64 = 0.25;
+/// How far a particle that is alone in the air may fly in a step [Δx]: it has no pressure, and is not lost within Δx.
+const FLIGHT: f64 = 0.8;
 
 /// Particles are put into cell order once in so many steps, for speed: no result depends on their order.
 const STEPS_BETWEEN_SORTS: u64 = 16;
@@ -172,7 +172,7 @@ impl<const D: usize> Simulation<D> {
         let is_first = self.clock.step == 0;
         motion.start(&self.settings, particles, &mut self.forcing.motion, self.clock.time, is_first)?;
         let [fastest, velocity_max] = self.velocity_max();
-        let time_step = self.time_step(velocity_max)?;
+        let time_step = self.time_step(velocity_max, fastest)?;
         let fraction = self.settings.derivative_frame.fraction();
         self.flow.motion.advance(&mut self.forcing.motion, self.clock.time, time_step, fraction)?;
         self.prepare_step(Travel { time_step, velocity_max: fastest, fraction });
@@ -223,7 +223,9 @@ impl<const D: usize> Simulation<D> {
         report.poses = self.flow.motion.poses();
         report.clock = self.clock;
         report.counts = self.flow.particles.counts();
-        report.angular_momentum = angular_momentum(&self.settings, &self.flow.particles);
+        if self.settings.free_surface.is_some() {
+            report.angular_momentum = angular_momentum(&self.settings, &self.flow.particles);
+        }
         report.places = self.flow.surface.counts();
         self.history.push(report);
         Ok(())
@@ -235,7 +237,7 @@ impl<const D: usize> Simulation<D> {
             return;
         }
         let [fastest, velocity_max] = self.velocity_max();
-        let time_step = self.time_step(velocity_max).unwrap_or(self.settings.time_step);
+        let time_step = self.time_step(velocity_max, fastest).unwrap_or(self.settings.time_step);
         self.search(Travel { time_step, velocity_max: fastest, fraction: 0.0 });
         self.prepared = true;
     }
@@ -269,18 +271,21 @@ impl<const D: usize> Simulation<D> {
         flow.returning
     }
 
-    /// Largest velocity modulus of the particles, and the largest as they count in the time step: what u_max stands for in r_AL and in
-    /// the stability law.
+    /// Largest velocity modulus of all particles, and of those that are not alone in the air: what u_max stands for in r_AL and in the
+    /// stability law. A drop of a splash does not hold up the others.
     fn velocity_max(&self) -> [f64; 2] {
         let particles = &self.flow.particles;
         let larger = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])];
-        let speeds = |i: usize| [particles.velocity[i].norm(), counting_speed(particles, i)];
+        let speeds = |i: usize| {
+            let speed = particles.velocity[i].norm();
+            [speed, if particles.place[i] == Place::Isolated { 0.0 } else { speed }]
+        };
         let largest = |range: Range<usize>| range.map(speeds).fold([0.0; 2], larger);
         parallel::reduce(particles.real, largest, larger).unwrap_or_default()
     }
 
-    /// Δt of the next step.
-    fn time_step(&self, velocity_max: f64) -> Result<f64> {
+    /// Δt of the next step, u_max and the speed of the fastest particle being these.
+    fn time_step(&self, velocity_max: f64, fastest: f64) -> Result<f64> {
         let settings = &self.settings;
         let motion = &self.flow.motion;
         if !settings.adaptive_time_step || settings.adaptive_until.is_some() {
@@ -290,12 +295,14 @@ impl<const D: usize> Simulation<D> {
             return Ok(settings.time_step);
         }
         let limits = self.scheme.limits(settings, velocity_max);
-        let fastest_waves = limits.courant.min(settings.time_step_safety * limits.penalty).min(limits.acoustic);
+        let flight =
+            if settings.free_surface.is_some() { FLIGHT * settings.particle_spacing / fastest } else { f64::INFINITY };
+        let fastest_waves = limits.courant.min(settings.time_step_safety * limits.penalty).min(limits.acoustic).min(flight);
         if fastest_waves < SMALLEST_TIME_STEP * settings.time_step {
-            let particles = &self.flow.particles;
-            let speed = |i: usize| counting_speed(particles, i);
-            let fastest = (0..particles.real).max_by(|&a, &b| speed(a).total_cmp(&speed(b)));
-            let symptom = Symptom { particle: fastest.unwrap_or(0), field: "velocity", value: velocity_max };
+            let velocity = &self.flow.particles.velocity[..self.flow.particles.real];
+            let particle =
+                (0..velocity.len()).max_by(|&a, &b| velocity[a].norm_squared().total_cmp(&velocity[b].norm_squared()));
+            let symptom = Symptom { particle: particle.unwrap_or(0), field: "velocity", value: fastest };
             return Err(self.diverged(symptom, fastest_waves, velocity_max));
         }
         let bodies = motion.step_limit(settings);
@@ -382,13 +389,6 @@ impl<const D: usize> Simulation<D> {
         inlet.sort_unstable_by_key(|&i| particles.id[i]);
         inlet
     }
-}
-
-/// What the speed of a particle counts in the time step. One that is alone in the air has no pressure, and may cross a spacing in a step:
-/// a drop of a splash does not hold up the others.
-fn counting_speed<const D: usize>(particles: &Particles<D>, i: usize) -> f64 {
-    let share = if particles.place[i] == Place::Isolated { ALONE } else { 1.0 };
-    share * particles.velocity[i].norm()
 }
 
 /// Fields derived from the particles at one time.

@@ -34,9 +34,8 @@ def taken(history: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """
     time = history["time"]
     rates = {name: history[column] for name, column in PARTS.items() if column in history}
-    if "pressure" not in rates or not len(time):
-        return {}
-    lost = energy(history)
-    sums = {name: np.cumsum(np.nan_to_num(rate[1:]) * np.diff(time)) for name, rate in rates.items()}
+    if "pressure" not in rates or not all(np.isfinite(rate[1:]).all() for rate in rates.values()) or not len(time):
+        return {}  # an older alsph, which began the run, does not tell
+    sums = {name: np.cumsum(rate[1:] * np.diff(time)) for name, rate in rates.items()}
     known = {name: np.concatenate([[0.0], total]) for name, total in sums.items()}
-    return {name: total for name, total in known.items() if np.abs(total).max() > NOTHING * np.abs(lost[0])}
+    return {name: total for name, total in known.items() if np.abs(total).max() > NOTHING * np.abs(energy(history)[0])}

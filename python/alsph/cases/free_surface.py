@@ -298,6 +298,7 @@ class FreeSurface(Case):
         if moved or not len(run.history.get("potential_energy", [])):
             return []
         total = energy(run.history)
-        rise = (total - np.minimum.accumulate(total)).max() / total[0]
-        lost = [Measure(TAKEN + name, float(part[-1] / total[0])) for name, part in taken(run.history).items()]
+        start = np.abs(total[0])
+        rise = (total - np.minimum.accumulate(total)).max() / start
+        lost = [Measure(TAKEN + name, float(part[-1] / start)) for name, part in taken(run.history).items()]
         return [Measure(ENERGY, float(rise), 0.0, 0.01, "energy is only lost"), *lost]

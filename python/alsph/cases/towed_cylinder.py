@@ -73,5 +73,6 @@ class TowedCylinder(MovingCylinder):
         ]
         time, step = run.history["time"], run.history["time_step"]
         force = sum(run.history[f"cylinder_{part}_force_x"] for part in ("pressure", "viscous"))
-        between = (time > times[0]) & (time <= times[-1])
+        middle = time - step / 2  # times are rounded in the file
+        between = (middle > times[0]) & (middle < times[-1])
         return float((force * step)[between].sum() / (momentum[0] - momentum[1]))

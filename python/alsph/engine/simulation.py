@@ -76,13 +76,13 @@ MOTION = ("displacement", "velocity", "angle", "angular_velocity")
 """Columns of the history that tell how bodies move."""
 
 
-OF_SURFACES = (
+COLUMNS_OF_SURFACES = (
     *(f"{part}_dissipation" for part in ("artificial", "penalty", "pressure", "sweep", "contact")),
     *(f"angular_momentum_{axis}" for axis in AXES),
 )
 """Columns of the history of a fluid with a free surface."""
 
-NOT_OF_PLANES = ("angular_momentum_x", "angular_momentum_y")
+COLUMNS_OF_SPACE = ("angular_momentum_x", "angular_momentum_y")
 """Those that say nothing in 2-D."""
 
 
@@ -306,8 +306,8 @@ class Simulation:
         -------
         dict
             ``position``, ``velocity``, ``normal`` (n, d), ``pressure``, ``volume``, ``velocity_divergence``, ``kind``,
-            ``body``, ``depth``, ``id`` (n,) and ``vorticity``, (n,) in 2-D and (n, 3) in 3-D; and the numbers ``time``,
-            ``step``, ``mass_in`` and ``mass_out``.
+            ``body``, ``depth``, ``id``, beside a free surface ``place`` (n,), ``vorticity``, (n,) in 2-D and (n, 3) in
+            3-D; and the numbers ``time``, ``step``, ``mass_in`` and ``mass_out``.
         """
         with self._engine() as engine:
             return engine.snapshot()
@@ -344,8 +344,8 @@ class Simulation:
             rows = engine.take_history()
         settings = self.problem.settings
         left_out: tuple[str, ...] = () if any(is_rigid(body) for body in settings["bodies"]) else MOTION
-        left_out += NOT_OF_PLANES if self.problem.dimensions == 2 else ()
-        left_out += () if settings.get("free_surface") else OF_SURFACES
+        left_out += COLUMNS_OF_SPACE if self.problem.dimensions == 2 else ()
+        left_out += () if settings.get("free_surface") else COLUMNS_OF_SURFACES
         rows = {name: values for name, values in rows.items() if name not in left_out}
         rows = {"step": rows["step"], **rows, **self._coefficients(rows)}
         if keep and len(rows["step"]):

@@ -27,7 +27,7 @@ FIELDS: dict[str, type[np.generic]] = {
 }
 """Point data and the types they are stored with."""
 
-OF_SURFACES: dict[str, type[np.generic]] = {"place": np.uint8}
+FIELDS_OF_SURFACES: dict[str, type[np.generic]] = {"place": np.uint8}
 """Those of a fluid with a free surface."""
 
 
@@ -43,7 +43,7 @@ def append(path: Path, time: float, particles: dict[str, NDArray[Any]]) -> None:
     particles
         The arrays of :meth:`alsph.Simulation.snapshot`; vectors get a third component 0 in 2-D.
     """
-    told = FIELDS | {name: dtype for name, dtype in OF_SURFACES.items() if name in particles}
+    told = FIELDS | {name: dtype for name, dtype in FIELDS_OF_SURFACES.items() if name in particles}
     columns = {name: np.asarray(particles[name], dtype) for name, dtype in told.items()}
     columns["velocity"] = three_components(columns["velocity"])
     points = three_components(np.asarray(particles["position"], np.float32))
@@ -122,7 +122,7 @@ def _append_part(root: h5py.Group, time: float, points: NDArray[Any], columns: d
     _write(root["NumberOfPoints"], part, count)
     _write(root["Points"], start, points)
     for name, column in columns.items():
-        if name in OF_SURFACES and name not in root["PointData"]:
+        if name in FIELDS_OF_SURFACES and name not in root["PointData"]:
             continue  # the file of an older version
         _write(root[f"PointData/{name}"], start, column)
         _write(root[f"Steps/PointDataOffsets/{name}"], part, start)

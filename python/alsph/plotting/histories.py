@@ -14,7 +14,7 @@ from alsph.analysis.window import DEVELOPING
 from alsph.arrays import FloatArray
 from alsph.plotting.style import PALETTE, TIME_LABEL, blank, line
 from alsph.results.ledger import Ledger
-from alsph.results.outcome import has_surface
+from alsph.results.outcome import has_moved, has_surface
 from alsph.results.run import Run
 
 if TYPE_CHECKING:
@@ -136,13 +136,16 @@ def robust_limits(records: list[tuple[FloatArray, FloatArray]]) -> tuple[float, 
 
 
 def ledger(run: Run) -> Figure:
-    """Divergence and the solver's effort on the left; volume, mass and kinetic energy with its budget on the right."""
+    """Divergence and the solver's effort on the left; on the right volume, mass, energy and its budget.
+
+    Beside a free surface, unless bodies move, it is known what parts of the step take of the energy.
+    """
     ledger, history = run.ledger, run.history
     empty = np.empty(0)
     fluid, mass = history.get("fluid", empty), history.get("mass_in", empty) - history.get("mass_out", empty)
     surface, potential = (history.get(name, empty) for name in ("surface", "potential_energy"))
     volume = ("relative change", {"volume": ledger.volume_drift, "volume over exact": ledger.volume_error})
-    energy, parts = {"kinetic energy": ledger.kinetic_energy}, taken(history)
+    energy, parts = {"kinetic energy": ledger.kinetic_energy}, {} if has_moved(history) else taken(history)
     change = {"fluid particles": fluid / fluid[:1] - 1, "mass in - out": mass / history.get("volume", empty)[:1]}
     if has_surface(history):
         volume = ("share of the fluid", {"at the surface": surface / fluid, "alone": history["isolated"] / fluid})
