@@ -121,8 +121,8 @@ def test_a_fast_drop_neither_holds_up_the_others_nor_ends_the_run(scheme, couran
     simulation.run_until(0.2)
     rows = simulation.history()
     assert rows["isolated"][0] == 1 and rows["mass_out"][-1] == pytest.approx(0.01)
-    if not case.is_weakly_compressible:
-        assert rows["time_step"][1] == pytest.approx(0.8 / courant * rows["time_step"][0])
+    if scheme in ("alsph", "isph"):  # the others' sound sets the step, too
+        assert rows["time_step"][1] == pytest.approx(0.8 / courant * rows["time_step"][0], rel=1e-4)
     # It goes on as it was, which its place is part of.
     begun = case.restored(state | drop)
     begun.advance(3)
