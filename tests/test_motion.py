@@ -279,7 +279,7 @@ def test_towed_and_fixed_feel_the_same(tmp_path):
     ]
     drags, balances = np.transpose([[measure.value for measure in run.measures] for run in runs])
     assert drags[0] == pytest.approx(drags[1], rel=0.03) and drags[0] > 1
-    assert balances == pytest.approx([1, 1], abs=0.02)
+    assert balances == pytest.approx([1, 1], abs=0.04)  # within 0.003 at D/Δx = 10
 
 
 def turning(case):
