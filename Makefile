@@ -30,7 +30,7 @@ test-python: $(EXTENSION) $(TOOLS)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses auto --dist loadfile
 
 test-validation: $(EXTENSION)  ## The quick validation from scratch.
 	rm -rf target/validation
