@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import alsph._alsph as _alsph
-from alsph.arrays import AXES, FloatArray
+from alsph.arrays import FloatArray
+from alsph.engine.columns import left_out
 from alsph.engine.motion import answering_poses, is_rigid
 from alsph.engine.prescribed import Prescription, Rule, answering, backflow
 from alsph.engine.problem import Problem
@@ -71,19 +72,6 @@ TYPES: dict[str, tuple[type[np.generic], int]] = {
 
 OF_BODIES = {"pose"}
 """Those that have a row a body, and not a particle."""
-
-MOTION = ("displacement", "velocity", "angle", "angular_velocity")
-"""Columns of the history that tell how bodies move."""
-
-
-COLUMNS_OF_SURFACES = (
-    *(f"{part}_dissipation" for part in ("artificial", "penalty", "pressure", "sweep", "contact")),
-    *(f"angular_momentum_{axis}" for axis in AXES),
-)
-"""Columns of the history of a fluid with a free surface."""
-
-COLUMNS_OF_SPACE = ("angular_momentum_x", "angular_momentum_y")
-"""Those that say nothing in 2-D."""
 
 
 @contextmanager
@@ -342,11 +330,8 @@ class Simulation:
         """
         with self._engine() as engine:
             rows = engine.take_history()
-        settings = self.problem.settings
-        left_out: tuple[str, ...] = () if any(is_rigid(body) for body in settings["bodies"]) else MOTION
-        left_out += COLUMNS_OF_SPACE if self.problem.dimensions == 2 else ()
-        left_out += () if settings.get("free_surface") else COLUMNS_OF_SURFACES
-        rows = {name: values for name, values in rows.items() if name not in left_out}
+        absent = left_out(self.problem.settings)
+        rows = {name: values for name, values in rows.items() if name not in absent}
         rows = {"step": rows["step"], **rows, **self._coefficients(rows)}
         if keep and len(rows["step"]):
             self._history.append(rows)
