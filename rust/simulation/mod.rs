@@ -276,12 +276,12 @@ impl<const D: usize> Simulation<D> {
     fn velocity_max(&self) -> [f64; 2] {
         let particles = &self.flow.particles;
         let larger = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])];
-        let speeds = |i: usize| {
-            let speed = particles.velocity[i].norm();
-            [speed, if particles.place[i] == Place::Isolated { 0.0 } else { speed }]
+        let squares = |i: usize| {
+            let square = particles.velocity[i].norm_squared();
+            [square, if particles.place[i] == Place::Isolated { 0.0 } else { square }]
         };
-        let largest = |range: Range<usize>| range.map(speeds).fold([0.0; 2], larger);
-        parallel::reduce(particles.real, largest, larger).unwrap_or_default()
+        let largest = |range: Range<usize>| range.map(squares).fold([0.0; 2], larger);
+        parallel::reduce(particles.real, largest, larger).unwrap_or_default().map(f64::sqrt)
     }
 
     /// Δt of the next step, u_max and the speed of the fastest particle being these.

@@ -20,7 +20,7 @@ mod solids;
 mod weakly_compressible;
 
 use crate::base::{Tensor, Vector, parallel};
-use crate::boundary::{VelocityRule, conditions, extrapolate_scalar, shepard};
+use crate::boundary::{VelocityRule, conditions, extrapolate_scalar};
 use crate::discretisation::{AdjointGradient, ConservativeGradient, Divergence, LaplacianAndGradient, LaplacianAndItsSum};
 use crate::flow::{Flow, Step};
 use crate::frame::Frame;
@@ -36,7 +36,7 @@ use crate::surface::Surface;
 
 use alsph::Penalty;
 use isph::Solution;
-use solids::{Held, keep_out, mirror};
+use solids::mirror;
 use weakly_compressible::Sound;
 
 /// The scheme that the settings name, beside a free surface.
@@ -203,41 +203,6 @@ impl<const D: usize> Terms<D> {
         frame.images.fill(&mut self.tensor);
     }
 
-    /// The pressure that images and solids show, which is not below that of the air where none is.
-    fn extend_pressure(&self, step: Step, flow: &mut Flow<D>) {
-        self.extend_pressure_above(self.least_pressure(), step, flow);
-    }
-
-    /// The same, of solids not below `least`.
-    fn extend_pressure_above(&self, least: f64, step: Step, flow: &mut Flow<D>) {
-        let Flow { particles, frame, body_force, surface, .. } = flow;
-        let (place, settings) = (&surface.place, step.settings);
-        let fill = |particles: &mut Particles<D>| {
-            frame.images.fill_pressure(&mut particles.pressure, &particles.position, |i| match place[i] {
-                Place::Inside | Place::Near => body_force.at(i) * settings.density,
-                Place::AtSurface | Place::Isolated => Vector::zeros(),
-            });
-        };
-        fill(particles);
-        if settings.bodies.is_empty() {
-            return;
-        }
-        let pressure = &particles.pressure;
-        let shown = |s: usize| {
-            let mean = shepard(settings, &frame.stencil, s, |j, r_sj| {
-                // Nothing is known of the pressure beyond what is at the surface, which may be falling.
-                let known = if surface.is_at_surface(j) { 0.0 } else { settings.density };
-                [pressure[j] + (body_force.at(j) - body_force.acceleration_of_wall(s)).dot(&r_sj) * known]
-            });
-            let [p] = mean.unwrap_or([0.0]);
-            p.max(least)
-        };
-        let shown = of_solids(&particles.kind[..particles.real], shown);
-        let real = frame.images.real(&mut particles.pressure);
-        shown.into_iter().for_each(|(s, p)| real[s] = p);
-        fill(particles);
-    }
-
     /// u* of friction alone. Solids keep their velocities.
     fn predict_velocity(&mut self, step: Step, flow: &Flow<D>) {
         let Flow { particles, frame, before, .. } = flow;
@@ -338,17 +303,6 @@ impl<const D: usize> Terms<D> {
         let tensor = std::mem::take(&mut self.tensor);
         self.react(flow, |s, f, r_sf| (tensor[s].0 + tensor[f].0) * r_sf * factor);
         self.tensor = tensor;
-    }
-
-    /// Let nothing come too near to solids, which feel that.
-    fn hold(&mut self, step: Step, flow: &mut Flow<D>) {
-        let Step { settings, time_step, .. } = step;
-        let mass = settings.density * settings.particle_spacing.powi(D as i32);
-        for Held { by, change, .. } in keep_out(settings, flow) {
-            let Flow { particles, frame, .. } = &*flow;
-            let change = frame.images.at_source(particles.real, by, change);
-            self.reaction[frame.images.source(particles.real, by)] -= change * (mass / time_step);
-        }
     }
 
     /// Begin anew with what acts on solids.

@@ -1,10 +1,11 @@
-//! What solids beside a free surface show of the velocity, and how near they let the fluid come.
+//! What images and solids beside a free surface show of pressure and velocity, and how near solids let the fluid come.
 
+use super::Terms;
 use crate::base::Vector;
 use crate::boundary::shepard;
-use crate::flow::Flow;
+use crate::flow::{Flow, Step};
 use crate::frame::Frame;
-use crate::particles::{ParticleKind, Particles, of_solids};
+use crate::particles::{ParticleKind, Particles, Place, of_solids};
 use crate::settings::Settings;
 use rayon::prelude::*;
 
@@ -14,16 +15,64 @@ const BESIDE: f64 = 1.2;
 
 /// What a solid has taken of the velocity of a particle that came too near.
 #[derive(Clone, Copy)]
-pub struct Held<const D: usize> {
+struct Held<const D: usize> {
     id: u64,
     /// The solid, or its image; that which has taken most, if it was not the only one.
-    pub by: usize,
-    pub change: Vector<D>,
+    by: usize,
+    change: Vector<D>,
+}
+
+impl<const D: usize> Terms<D> {
+    /// The pressure that images and solids show, which is not below that of the air where none is.
+    pub(super) fn extend_pressure(&self, step: Step, flow: &mut Flow<D>) {
+        self.extend_pressure_above(self.least_pressure(), step, flow);
+    }
+
+    /// The same, of solids not below `least`.
+    pub(super) fn extend_pressure_above(&self, least: f64, step: Step, flow: &mut Flow<D>) {
+        let Flow { particles, frame, body_force, surface, .. } = flow;
+        let (place, settings) = (&surface.place, step.settings);
+        let fill = |particles: &mut Particles<D>| {
+            frame.images.fill_pressure(&mut particles.pressure, &particles.position, |i| match place[i] {
+                Place::Inside | Place::Near => body_force.at(i) * settings.density,
+                Place::AtSurface | Place::Isolated => Vector::zeros(),
+            });
+        };
+        fill(particles);
+        if settings.bodies.is_empty() {
+            return;
+        }
+        let pressure = &particles.pressure;
+        let shown = |s: usize| {
+            let mean = shepard(settings, &frame.stencil, s, |j, r_sj| {
+                // Nothing is known of the pressure beyond what is at the surface, which may be falling.
+                let known = if surface.is_at_surface(j) { 0.0 } else { settings.density };
+                [pressure[j] + (body_force.at(j) - body_force.acceleration_of_wall(s)).dot(&r_sj) * known]
+            });
+            let [p] = mean.unwrap_or([0.0]);
+            p.max(least)
+        };
+        let shown = of_solids(&particles.kind[..particles.real], shown);
+        let real = frame.images.real(&mut particles.pressure);
+        shown.into_iter().for_each(|(s, p)| real[s] = p);
+        fill(particles);
+    }
+
+    /// Let nothing come too near to solids, which feel that.
+    pub(super) fn hold(&mut self, step: Step, flow: &mut Flow<D>) {
+        let Step { settings, time_step, .. } = step;
+        let mass = settings.density * settings.particle_spacing.powi(D as i32);
+        for Held { by, change, .. } in keep_out(settings, flow) {
+            let Flow { particles, frame, .. } = &*flow;
+            let change = frame.images.at_source(particles.real, by, change);
+            self.reaction[frame.images.source(particles.real, by)] -= change * (mass / time_step);
+        }
+    }
 }
 
 /// Take what is next to a surface no nearer. A pressure that is not below that of the air holds little back where the fluid is thin. Returns
 /// what solids have taken, in an order that does not depend on how particles are stored.
-pub fn keep_out<const D: usize>(settings: &Settings, Flow { particles, frame, .. }: &mut Flow<D>) -> Vec<Held<D>> {
+fn keep_out<const D: usize>(settings: &Settings, Flow { particles, frame, .. }: &mut Flow<D>) -> Vec<Held<D>> {
     if settings.bodies.is_empty() {
         return Vec::new();
     }
