@@ -284,7 +284,7 @@ def test_an_older_run_that_goes_on_has_no_free_surface():
 
 def test_gauges_tell_the_depth_of_a_lattice():
     case = cases.StillWater(resolution=20)
-    levels = cases.free_surface.Levels([0.0, 0.3, 0.5, 1.0], 1.0, case.particle_spacing)
+    levels = cases.free_surface.Levels([0.0, 0.3, 0.5, 1.0], case.domain(), case.particle_spacing)
     assert levels.depth(case.particles()["position"]) == pytest.approx(1, rel=1e-12)
 
 

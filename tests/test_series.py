@@ -93,22 +93,25 @@ def test_depths_in_space_are_those_of_a_lattice():
     position = case.particles()["position"]
     spacing = case.particle_spacing
     gauges = [[0.0, 0.0], [0.3, 0.2], [0.9, 0.5], [1.0, 0.25]]
-    levels = Levels(gauges, [case.tank_length, case.width], spacing)
+    levels = Levels(gauges, case.domain(), spacing)
     assert levels.depth(position) == pytest.approx(1, rel=1e-12)
     assert levels.columns[1:3] == ["depth at x = 0 H; y = 0 H [H]", "depth at x = 0.3 H; y = 0.2 H [H]"]
     upper = position[:, 1] > 0.25
-    half = Levels([[0.9, 0.0], [0.9, 0.5], [0.9, 0.25]], [case.tank_length, case.width], spacing)
+    half = Levels([[0.9, 0.0], [0.9, 0.5], [0.9, 0.25]], case.domain(), spacing)
     across = position[~upper | (position[:, 2] < 0.5)]  # half as deep along the one side
     assert across.shape != position.shape
     low, high, middle = half.depth(across)
     assert high == pytest.approx(0.5, abs=0.1) and low == pytest.approx(1, abs=0.1) and high < middle < low
 
 
-@pytest.mark.parametrize(("gauges", "lengths"), [([0.1], [2, 1]), ([[0.1, 0.2]], 2)])
-def test_gauges_of_another_number_of_directions_are_refused(gauges, lengths):
+@pytest.mark.parametrize(("gauges", "dimensions"), [([0.1], 3), ([[0.1, 0.2]], 2)])
+def test_gauges_of_another_number_of_directions_are_refused(gauges, dimensions):
+    def tank(dimensions):
+        return Domain([0] * dimensions, [2] * dimensions, [("slip", "slip")] * dimensions)
+
     with pytest.raises(ConfigError, match="along x and y"):
-        Levels(gauges, lengths, 0.1)
-    levels = Levels([0.1], 2.0, 0.1)
+        Levels(gauges, tank(dimensions), 0.1)
+    levels = Levels([0.1], tank(2), 0.1)
     with pytest.raises(ConfigError, match="tank in 2-D"):
         levels.depth(np.zeros((4, 3)))
 
@@ -326,3 +329,50 @@ def test_a_width_without_a_third_dimension_is_refused(alsph):
     assert cases.DamBreak(width=0.4, dimensions=3, resolution=10).width == 0.4
     code, _, complaint = alsph("run", "dam_break", "--width", "0.4")
     assert code == 2 and "width = 0.4: of a tank in 3-D" in complaint
+
+
+def test_gauges_of_a_run_tell_what_its_snapshots_have(tmp_path):
+    """In 2-D and 3-D, a run that was cut included; the mean of a whole line of them is the volume over the length."""
+    sizes = {"2": ("0:2:41", 0.5), "3": ("0.5,0.2; 1.5,0.1", 0.3)}
+    for dimensions, (gauges, until) in sizes.items():
+        case = cases.DamBreak(resolution=10, tank_length=2.0, length=1.0, dimensions=int(dimensions))
+        settings = {"gauges": gauges, "gauge_interval": 0.1, "output_interval": 0.1, "progress": False}
+        whole = case.run(tmp_path / dimensions, until=until, **settings)
+        case.run(tmp_path / f"{dimensions}_cut", until=0.2, **settings)
+        cut = alsph.resume(tmp_path / f"{dimensions}_cut", until=until, progress=False)
+        assert (whole.path / "gauges.csv").read_text() == (cut.path / "gauges.csv").read_text()
+        found = whole.gauges
+        assert found.depth.shape == (len(found.time), len(found.position)) and len(found.time) > 2
+        last = whole.snapshot().position
+        assert found.time[-1] == pytest.approx(whole.times[-1])
+        levels = Levels(found.position, case.domain(), case.particle_spacing)
+        assert found.depth[-1] == pytest.approx(levels.depth(last), abs=1e-6)  # snapshots are in single precision
+        if dimensions == "2":
+            assert np.trapezoid(found.depth, found.position[:, 0], axis=1) == pytest.approx(1.0, rel=2e-3)
+    text = (tmp_path / "3" / "gauges.csv").read_text()
+    assert text.splitlines()[0].endswith("depth at x = 1.5 H; y = 0.1 H [H]")
+
+
+def test_gauges_beside_the_topmost_row_of_a_wave(tmp_path):
+    case = cases.StandingWave(resolution=20)
+    run = case.run(tmp_path / "wave", until=0.3, gauges="0:1:5", progress=False)
+    position, spacing = run.snapshot().position, case.particle_spacing
+    for place, depth in zip(run.gauges.position[:, 0], run.gauges.depth[-1], strict=True):
+        near = np.abs(position[:, 0] - place) < 0.8 * spacing
+        assert depth == pytest.approx(position[near, 1].max() + spacing / 2, abs=0.25 * spacing)
+
+
+@pytest.mark.parametrize(
+    ("case", "gauges", "message"),
+    [
+        (cases.Cylinder(), "1", "cylinder has no water that lies on a floor"),
+        (cases.EllipticalDrop(), [0.5], "no water that lies on a floor"),
+        (cases.DamBreak(), "0.5,1", "must be a finite number, x"),
+        (cases.DamBreak(), "6", r"\[6.0\] lies outside of the domain, \[0.0\] to \[5.366\] \[H\]"),
+        (cases.DamBreak(dimensions=3), "1", "must be two finite numbers"),
+        (cases.DamBreak(), "0:1", "run.gauges: '0:1' is no line"),
+    ],
+)
+def test_gauges_that_cannot_be_are_refused(case, gauges, message):
+    with pytest.raises(ConfigError, match=message):
+        _ = Config(case, RunSettings(gauges=gauges)).gauges

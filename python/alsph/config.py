@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
 import tomli_w
-from pydantic import Field, TypeAdapter, WrapValidator, field_validator, model_validator
+from pydantic import Field, TypeAdapter, ValidationInfo, WrapValidator, field_validator, model_validator
 
 from alsph import cases
 from alsph.analysis.planes import grids
@@ -94,19 +94,6 @@ class RunSettings(Parameters):
         description="points where velocity and pressure are recorded, and lines of them: 'X,Y; X,Y:X,Y:COUNT' [D]",
     )
 
-    @field_validator("probes", mode="before")
-    @classmethod
-    def _plain(cls, probes: Any) -> Any:
-        if probes is None or isinstance(probes, str):
-            return probes
-        try:
-            found = np.array(probes, float)
-        except (TypeError, ValueError):
-            found = np.empty(0)
-        if found.ndim != 2:
-            raise ValueError("must be a text such as '6,0; 5,-1:5,1:21', or a list of points")
-        return found.tolist()
-
     probe_interval: float | None = Field(
         default=None, gt=0, description="time between two records of the probes, 0.05 if not given [D/U]"
     )
@@ -128,6 +115,31 @@ class RunSettings(Parameters):
     plane_interval: float | None = Field(
         default=None, gt=0, description="time between two records of the planes, 0.5 if not given [D/U]"
     )
+    gauges: str | list[list[float]] | None = Field(
+        default=None,
+        description="places on the floor where the depth of water is recorded, in 3-D by x and y, and lines of them: "
+        "'X; X:X:COUNT' or 'X,Y; X,Y:X,Y:COUNT' [D]",
+    )
+    gauge_interval: float | None = Field(
+        default=None, gt=0, description="time between two records of the gauges, 0.05 if not given [D/U]"
+    )
+
+    @field_validator("probes", "gauges", mode="before")
+    @classmethod
+    def _plain(cls, given: Any, info: ValidationInfo) -> Any:
+        if given is None or isinstance(given, str):
+            return given
+        try:
+            found = np.array(given, float)
+        except (TypeError, ValueError):
+            found = np.empty(0)
+        if info.field_name == "gauges" and found.ndim == 1 and len(found):
+            found = found[:, None]
+        if found.ndim != 2:
+            example = "'0.5; 0:3:31'" if info.field_name == "gauges" else "'6,0; 5,-1:5,1:21'"
+            raise ValueError(f"must be a text such as {example}, or a list of points")
+        return found.tolist()
+
     checkpoint_minutes: float = Field(default=10.0, gt=0, description="longest time between two checkpoints [min]")
     flush_seconds: float = Field(
         default=2.0, gt=0, description="longest time that rows of the history stay unwritten [s]"
@@ -217,11 +229,28 @@ class Config:
         ConfigError
             If they are no points of the domain.
         """
-        found = points(self.run.probes or [], self.case.space_dimensions)
-        domain = self.case.checked_domain
-        for point in found[~domain.contains(found)]:
-            box = f"{list(domain.lower)} to {list(domain.upper)} [D]"
-            told = f"run.probes: {point.tolist()} lies outside of the domain, {box}"
+        return self._within("probes", self.case.space_dimensions)
+
+    @property
+    def gauges(self) -> FloatArray:
+        """Places (m, d − 1) of the gauges of depth, along x and in 3-D y [D].
+
+        Raises
+        ------
+        ConfigError
+            If the case has no water that lies in a tank, or they are no places of the domain.
+        """
+        if self.run.gauges and not self.case.has_depth:
+            raise ConfigError(f"run.gauges: {self.case.name} has no water that lies on a floor; leave them out")
+        return self._within("gauges", self.case.space_dimensions - 1)
+
+    def _within(self, setting: str, dimensions: int) -> FloatArray:
+        """Return points (m, d') of a setting, by their first coordinates, if they are in the domain."""
+        name, domain = f"run.{setting}", self.case.checked_domain
+        found = points(getattr(self.run, setting) or [], dimensions, name)
+        lower, upper = (list(corner[:dimensions]) for corner in (domain.lower, domain.upper))
+        for point in found[((found < lower) | (found > upper)).any(axis=1)]:
+            told = f"{name}: {point.tolist()} lies outside of the domain, {lower} to {upper} [D]"
             raise ConfigError(self.case.symbols(told))
         return found
 
@@ -254,7 +283,7 @@ class Config:
         return of_the_flow(self.case_tables())
 
     def check(self) -> None:
-        """Refuse parameters that a file cannot give back, and probes and planes outside of the domain.
+        """Refuse parameters that a file cannot give back, and probes, planes and gauges outside of the domain.
 
         Raises
         ------
@@ -274,7 +303,7 @@ class Config:
             odd = [name for name, value in values.items() if not isinstance(value, KEPT)] or list(table)
             told = f"{odd[0]} = {shown(values[odd[0]])}: a parameter of {kind.__name__} that its file cannot give back"
             raise ConfigError(f"{told}; use numbers, texts, true or false, and lists of them")
-        _ = self.probes, self.planes
+        _ = self.probes, self.planes, self.gauges
 
     def text(self) -> str:
         """Return the configuration with all its parameters as TOML."""

@@ -1,4 +1,4 @@
-"""Points at which a run records velocity and pressure as it goes."""
+"""Points at which a run records velocity and pressure, and places where it records the depth of water, as it goes."""
 
 import re
 from collections.abc import Sequence
@@ -36,7 +36,26 @@ class Probes:
     pressure: FloatArray
 
 
-def points(given: str | Sequence[Sequence[float]], dimensions: int) -> FloatArray:
+@dataclass(frozen=True, eq=False)
+class GaugeRecord:
+    """The depth of the water at places over time.
+
+    Attributes
+    ----------
+    position : ndarray, shape (m, d − 1)
+        The places along x, in 3-D along x and y [D].
+    time : ndarray, shape (k,)
+        Times [D/U].
+    depth : ndarray, shape (k, m)
+        Depths [D].
+    """
+
+    position: FloatArray
+    time: FloatArray
+    depth: FloatArray
+
+
+def points(given: str | Sequence[Sequence[float]], dimensions: int, setting: str = "run.probes") -> FloatArray:
     """Return points (m, d) as they are given: one after the other or, in a text, also in lines.
 
     Parameters
@@ -46,6 +65,8 @@ def points(given: str | Sequence[Sequence[float]], dimensions: int) -> FloatArra
         (6, 1).
     dimensions
         Number of coordinates d that each must have.
+    setting
+        What they are called in messages.
 
     Raises
     ------
@@ -53,21 +74,20 @@ def points(given: str | Sequence[Sequence[float]], dimensions: int) -> FloatArra
         If there are others in it.
     """
     parts = [part for part in re.split(r"[;\s]+", given) if part] if isinstance(given, str) else list(given)
-    found = [_line(part, dimensions) if isinstance(part, str) else _numbers(part, dimensions)[None] for part in parts]
+    found = [
+        _line(part, dimensions, setting) if isinstance(part, str) else checked_point(setting, part, dimensions)[None]
+        for part in parts
+    ]
     if sum(map(len, found)) > MOST_POINTS:
-        raise ConfigError(f"run.probes: more than {MOST_POINTS} points")
+        raise ConfigError(f"{setting}: more than {MOST_POINTS} points")
     return np.concatenate([np.empty((0, dimensions)), *found])
 
 
-def _line(text: str, dimensions: int) -> FloatArray:
+def _line(text: str, dimensions: int, setting: str) -> FloatArray:
     start, *rest = text.split(":")
-    first = _numbers(start.split(","), dimensions, text)
+    first = checked_point(setting, start.split(","), dimensions, text)
     if not rest:
         return first[None]
     if len(rest) != 2 or not re.fullmatch("[0-9]{1,5}", rest[1]) or not 2 <= int(rest[1]) <= MOST_POINTS:
-        raise ConfigError(f"run.probes: {shown(text)} is no line, which is X,Y:X,Y:COUNT from one point to another")
-    return np.linspace(first, _numbers(rest[0].split(","), dimensions, text), int(rest[1]))
-
-
-def _numbers(words: Sequence[object], dimensions: int, text: str = "") -> FloatArray:
-    return checked_point("run.probes", words, dimensions, text)
+        raise ConfigError(f"{setting}: {shown(text)} is no line, which is X,Y:X,Y:COUNT from one point to another")
+    return np.linspace(first, checked_point(setting, rest[0].split(","), dimensions, text), int(rest[1]))

@@ -158,6 +158,11 @@ class Case(Driven):
         """Whether drag, lift and shedding of a body are what its runs are averaged for."""
         return self.settles and bool(self.coefficient_bodies)
 
+    @property
+    def has_depth(self) -> bool:
+        """Whether there is water that lies on a floor, for gauges to tell its depth."""
+        return False
+
     def surface_points(self) -> Surface | None:
         """Return where the surface pressure is sampled."""
         return None

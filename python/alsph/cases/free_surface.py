@@ -44,36 +44,40 @@ class Levels(Series):
     """The depth of the water at gauges over time, in a file of the run folder.
 
     It is what lies in a column around the gauge, over its width: spray counts as what it is, and the level is smooth.
+    Where a body lies in the column the depth is less by it.
 
     Parameters
     ----------
     gauges
-        Their places along x, in 3-D along x and y (m, 2) [H].
-    lengths
-        Length of the tank along x, in 3-D along x and y, from 0 [H].
+        Their places along x, in 3-D along x and y (m, 2) [D].
+    domain
+        The tank; beyond its sides the water goes on as in a mirror, or from the opposite one where they are periodic.
     spacing
-        Particle spacing Δx [H].
+        Particle spacing Δx [D].
+    symbols
+        What the case calls D and D/U.
 
     Raises
     ------
     ConfigError
-        If gauges and lengths are not of the same number of directions.
+        If gauges and domain are not of the same number of directions.
     """
 
     file = "output_levels.csv"
     interval = 0.05
 
     def __init__(
-        self, gauges: Sequence[float] | Sequence[Sequence[float]], lengths: float | Sequence[float], spacing: float
+        self, gauges: ArrayLike | Sequence[Sequence[float]], domain: Domain, spacing: float, symbols: Symbols = WATER
     ) -> None:
-        self.lengths, self.spacing = np.atleast_1d(np.asarray(lengths, float)), spacing
-        self.gauges = np.asarray(gauges, float).reshape(len(gauges), -1)
-        if self.gauges.shape[1] != len(self.lengths):
+        found = np.asarray(gauges, float)
+        self.gauges, self.domain, self.spacing = found.reshape(len(found), -1), domain, spacing
+        if self.gauges.shape[1] != domain.dimensions - 1:
             raise ConfigError("gauges: each needs a place along x, in a tank in 3-D along x and y")
         places = [
-            "; ".join(f"{axis} = {at:g} H" for axis, at in zip("xy", gauge, strict=False)) for gauge in self.gauges
+            "; ".join(f"{axis} = {at:g} {symbols.length}" for axis, at in zip("xy", gauge, strict=False))
+            for gauge in self.gauges
         ]
-        super().__init__(["time [√(H/g)]", *(f"depth at {place} [H]" for place in places)])
+        super().__init__([symbols("time [D/U]"), *(symbols(f"depth at {place} [D]") for place in places)])
 
     def values(self, simulation: Simulation) -> FloatArray:
         """Return the present depths (m,)."""
@@ -83,18 +87,26 @@ class Levels(Series):
     def depth(self, position: FloatArray) -> FloatArray:
         """Return the depth (m,) at the gauges of fluid particles at positions (n, d).
 
-        The column reaches four spacings to each side, along x and y alike, and ends softly; beyond a wall it goes on as
-        in a mirror.
+        The column reaches four spacings to each side, along x and y alike, and ends softly.
         """
-        if position.shape[1] != len(self.lengths) + 1:
-            raise ConfigError(f"gauges: they are of a tank in {len(self.lengths) + 1}-D")
+        if position.shape[1] != self.domain.dimensions:
+            raise ConfigError(f"gauges: they are of a tank in {self.domain.dimensions}-D")
         share = np.ones((len(self.gauges), len(position)))
-        for axis, length in enumerate(self.lengths):
-            along = position[:, axis]
-            images = np.stack([along, -along, 2 * length - along])
+        for axis in range(self.gauges.shape[1]):
+            along, low, high = position[:, axis], self.domain.lower[axis], self.domain.upper[axis]
+            if self.domain.periodic[axis]:
+                images = along + (high - low) * np.array([[0], [-1], [1]])
+            else:
+                images = np.stack([along, 2 * low - along, 2 * high - along])
             away = np.abs(images - self.gauges[:, None, [axis]]) / (4 * self.spacing)
             share *= np.where(away < 1, 1 + np.cos(np.pi * away), 0.0).sum(axis=1) / 8
         return np.asarray(share.sum(axis=1) * self.spacing)
+
+
+class Gauges(Levels):
+    """The depth of the water at the `gauges` of a run."""
+
+    file = "gauges.csv"
 
 
 class Sensors(Series):
@@ -236,6 +248,11 @@ class FreeSurface(Case):
     def reference_velocity(self) -> float:
         """The least that u_max counts in the time step [U]."""
         return 1.0
+
+    @property
+    def has_depth(self) -> bool:
+        """Where gravity acts."""
+        return self.gravity
 
     def body_force(self) -> list[float]:
         """Return gravity, which points down the last axis [U²/D], if it acts."""

@@ -178,7 +178,7 @@ class Sloshing(FreeSurface):
 
     def outputs(self) -> list[Output]:
         """Return the record of the level at the gauge."""
-        return [Levels([self.gauge], self._whole_length, self.particle_spacing)]
+        return [Levels([self.gauge], self.domain(), self.particle_spacing)]
 
     def linear_level(self, time: FloatArray, x: float) -> FloatArray:
         """Return the elevation (n,) at times (n,) and a place, of linear theory [H].

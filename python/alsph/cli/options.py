@@ -139,6 +139,7 @@ def _without_effect(case: cases.Case) -> set[str]:
         "inlet_velocity": [*domain.inlets()],
         "surface_interval": case.surface_points(),
         "initial_run": not domain.meets_air,
+        **dict.fromkeys(("gauges", "gauge_interval"), case.has_depth),
         **dict.fromkeys(config.OF_CONVERGED, case.is_averaged),
     }
     return {name for name, on in acts.items() if not on}

@@ -8,7 +8,7 @@ from alsph.arrays import FloatArray
 from alsph.errors import ConfigError
 from alsph.text import shown
 
-COORDINATES = {2: "two finite numbers, x and y", 3: "three finite numbers, x, y and z"}
+COORDINATES = {1: "a finite number, x", 2: "two finite numbers, x and y", 3: "three finite numbers, x, y and z"}
 
 
 def numbers(given: object) -> FloatArray:

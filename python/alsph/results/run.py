@@ -13,8 +13,10 @@ import numpy as np
 
 from alsph.analysis.averages import Estimate
 from alsph.analysis.measures import Measure, Profile
+from alsph.analysis.probes import GaugeRecord
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
+from alsph.cases.free_surface import Gauges
 from alsph.cases.source import reason, shown_name
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
@@ -105,6 +107,12 @@ class Run(Loads):
             what = reason(error, case.code.file if case.code else "<cell>")
             return [], [f"no measures: those of {type(case).__name__} fail, {what}; correct the file that defines it"]
         return [alone for measure in found if (alone := measure.alone())] if case.is_driven else found, []
+
+    @cached_property
+    def gauges(self) -> GaugeRecord:
+        """The depth of the water at the run's gauges over time; empty without any."""
+        time, depth = Gauges.read(self)
+        return GaugeRecord(self.config.gauges, time, depth.T[:, : len(self.config.gauges)])
 
     @cached_property
     def profiles(self) -> list[Profile]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from alsph.analysis.sampling import in_solid
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
+from alsph.cases.free_surface import Gauges
 from alsph.config import Config
 from alsph.engine.output import Output
 from alsph.engine.simulation import Simulation
@@ -120,7 +121,7 @@ def _in_a_body(probes: FloatArray, state: Mapping[str, Any]) -> list[str]:
 
 
 def outputs_of(config: Config) -> list[Output]:
-    """Return what a run records: the pressure on the surface of its body, probes, planes, and what its case adds.
+    """Return what a run records: the pressure on the surface of its body, probes, planes, gauges, and its case's own.
 
     Raises
     ------
@@ -138,7 +139,16 @@ def outputs_of(config: Config) -> list[Output]:
     for name, count in Counter(output.file for output in own).items():
         if count > 1:
             raise ConfigError(f"case '{config.case.name}': {count} outputs have the file {name}; one file, one output")
-    return [*_samples_of(config), *own]
+    return [*_samples_of(config), *_gauges_of(config), *own]
+
+
+def _gauges_of(config: Config) -> Iterator[Gauges]:
+    """Yield the depth of the water, where there are gauges."""
+    if len(config.gauges):
+        case = config.case
+        gauges = Gauges(config.gauges, case.checked_domain, case.particle_spacing, case.symbols)
+        gauges.interval = config.run.gauge_interval or gauges.interval
+        yield gauges
 
 
 def _samples_of(config: Config) -> Iterator[Samples]:
