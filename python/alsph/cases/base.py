@@ -20,9 +20,10 @@ from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.driven import RULES, Driven
 from alsph.cases.method import Method
+from alsph.engine.core import bytes_per_particle, time_step_limits
 from alsph.engine.output import Output
 from alsph.engine.problem import Problem
-from alsph.engine.simulation import Simulation, bytes_per_particle, time_step_limits
+from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError
 from alsph.geometry.domain import SolidBody
 from alsph.geometry.particles import Kind

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
-from alsph.engine.simulation import kernels
+from alsph.engine.core import kernels
 from alsph.parameters import Parameters
 
 SUPPORT = kernels()

@@ -1,4 +1,4 @@
-"""The simulation: particles, and the means to step them. The only Python module that calls the engine."""
+"""The simulation: particles, and the means to step them."""
 
 import json
 import math
@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 import alsph._alsph as _alsph
 from alsph.arrays import FloatArray
 from alsph.engine.columns import left_out
+from alsph.engine.core import TYPES, exact, translated
 from alsph.engine.motion import answering_poses, is_rigid
 from alsph.engine.prescribed import Prescription, Rule, answering, backflow
 from alsph.engine.problem import Problem
@@ -25,90 +26,11 @@ from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Kind
 from alsph.text import shown
 
-VERSION = _alsph.__version__
-
 AS_IT_IS: Any = object()
 """Stands for a rule that is not named."""
 
 SLICE_SECONDS = 0.2
 """Longest time in the engine without a look at signals, so that Ctrl-C works."""
-
-
-def instructions() -> str:
-    """Return the instruction set that the engine's loops use on this machine."""
-    return _alsph.instructions()
-
-
-def bytes_per_particle(settings: dict[str, Any]) -> float:
-    """Return the engine's estimated memory per particle [bytes]."""
-    with _translated():
-        return _alsph.bytes_per_particle(json.dumps(settings))
-
-
-def time_step_limits(settings: dict[str, Any], velocity_max: float) -> dict[str, float]:
-    """Return bounds of Δt, ``courant``, ``penalty``, ``acoustic``, ``viscous``, ``body_force`` [D/U], and λ_max."""
-    with _translated():
-        return _alsph.time_step_limits(json.dumps(settings), velocity_max)
-
-
-def kernels() -> dict[str, float]:
-    """Return the kernels by name, each with its support radius over the smoothing length."""
-    return _alsph.kernels()
-
-
-TYPES: dict[str, tuple[type[np.generic], int]] = {
-    "position": (np.float64, 2),
-    "velocity": (np.float64, 2),
-    "pressure": (np.float64, 1),
-    "kind": (np.uint8, 1),
-    "body": (np.uint16, 1),
-    "normal": (np.float64, 2),
-    "depth": (np.float64, 1),
-    "place": (np.uint8, 1),
-    "id": (np.uint64, 1),
-    "pose": (np.float64, 2),
-}
-"""The arrays of a state: their types and numbers of dimensions."""
-
-OF_BODIES = {"pose"}
-"""Those that have a row a body, and not a particle."""
-
-
-@contextmanager
-def _translated() -> Iterator[None]:
-    try:
-        yield
-    except _alsph.ConfigError as error:
-        raise ConfigError(str(error)) from None
-    except _alsph.SolverError as error:
-        raise SolverError(str(error)) from None
-    except BaseException as error:
-        if type(error).__name__ != "PanicException":  # that of the engine's edge to Python, which it does not export
-            raise
-        raise SolverError(f"the engine gave up, probably as it was out of memory: {error}") from None
-
-
-def _exact(name: str, values: ArrayLike, kind: type[np.generic], dimensions: int | None = None) -> NDArray[Any]:
-    """Return an array of the type that the engine takes, if that changes no value.
-
-    Raises
-    ------
-    ConfigError
-        If it does, or the array has another number of dimensions.
-    """
-    wanted = "numbers" if kind == np.float64 else f"whole numbers from 0 to {256 ** np.dtype(kind).itemsize - 1}"
-    try:
-        given = np.asarray(values)
-        given = given if given.dtype.kind in "iufb" else np.array(None)
-        with np.errstate(all="ignore"):
-            exact = np.ascontiguousarray(given, kind)
-        if not np.array_equal(given, exact, equal_nan=kind == np.float64):
-            raise ValueError
-    except (TypeError, ValueError):
-        raise ConfigError(f"array `{name}`: must hold {wanted}") from None
-    if dimensions and exact.ndim != dimensions:
-        raise ConfigError(f"array `{name}`: must have {dimensions} dimensions, and has {exact.ndim}")
-    return exact
 
 
 def _whole(name: str, value: Any) -> int:
@@ -173,9 +95,9 @@ class Simulation:
     def _start(self, state: dict[str, Any], threads: int | None) -> None:
         if threads is not None and not (isinstance(threads, int) and threads >= 1):
             raise ConfigError(f"threads = {shown(threads)}: must be a whole number, 1 or more")
-        exact = {name: _exact(name, state[name], *TYPES[name]) if name in TYPES else state[name] for name in state}
-        with _translated():
-            self._engine_of_process = _alsph.Simulation(json.dumps(self.problem.settings), exact, threads)
+        arrays = {name: exact(name, state[name], *TYPES[name]) if name in TYPES else state[name] for name in state}
+        with translated():
+            self._engine_of_process = _alsph.Simulation(json.dumps(self.problem.settings), arrays, threads)
         self._process, self._user = os.getpid(), threading.RLock()
         inlet = np.asarray(state["kind"]) == Kind.INLET
         self._check_inflow(np.asarray(state["position"])[inlet], np.asarray(state["velocity"])[inlet])
@@ -199,7 +121,7 @@ class Simulation:
                 "this simulation is in use by another thread; let one thread at a time use it, or make two"
             )
         try:
-            with _translated():
+            with translated():
                 yield self._engine_of_process
         except SolverError as error:
             if not self.backflow:
@@ -357,7 +279,7 @@ class Simulation:
     def sample(self, points: FloatArray) -> dict[str, FloatArray]:
         """Return the fluid's ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d); NaN far from all fluid."""
         with self._engine() as engine:
-            found = engine.sample(_exact("points", points, np.float64, 2))
+            found = engine.sample(exact("points", points, np.float64, 2))
         surface = self.problem.settings.get("free_surface")
         if surface and not surface["tension"]:  # beyond the last particles the fit knows nothing of the air
             found["pressure"] = np.maximum(found["pressure"], 0.0)
@@ -480,7 +402,7 @@ class Simulation:
 
     def _apply(self, velocity: ArrayLike, position: FloatArray) -> FloatArray:
         """Give the inlet particles at `position` (m, d) a velocity, (d,) or (m, d), and return it as (m, d)."""
-        values = _exact("inflow velocity", velocity, np.float64)
+        values = exact("inflow velocity", velocity, np.float64)
         with self._engine() as engine:
             engine.set_inflow(values)  # refuses wrong shapes
         every = np.broadcast_to(values, position.shape)

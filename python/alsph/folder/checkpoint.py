@@ -17,8 +17,8 @@ from typing import Any, BinaryIO
 import h5py
 import numpy as np
 
+from alsph.engine.core import OF_BODIES, TYPES
 from alsph.engine.prescribed import WORDS, Prescription
-from alsph.engine.simulation import OF_BODIES, TYPES
 from alsph.errors import DamagedError, RunFolderError
 from alsph.folder.durable import replacing
 from alsph.folder.reading import DAMAGE, rows, sound

@@ -13,7 +13,7 @@ from alsph.arrays import AXES, FloatArray
 from alsph.cases.base import Case
 from alsph.geometry.particles import Snapshot
 
-PARTS = ("pressure", "viscous")
+FORCES = ("pressure", "viscous")
 """Of the loads on a body."""
 
 
@@ -115,17 +115,17 @@ def _wall_power(run: Record, case: Case) -> FloatArray:
         if body.velocity is None:
             return np.full_like(power, np.nan)
         for axis, speed in zip(AXES, body.velocity, strict=False):
-            for part in PARTS:
+            for part in FORCES:
                 power -= speed * run.history[f"{body.name}_{part}_force_{axis}"]
     return power
 
 
 def _rigid_power(history: dict[str, FloatArray], body: str) -> FloatArray:
     """Return that of a rigid body: minus force and torque times its velocity and angular velocity."""
-    pairs = [(f"{body}_{part}_force_{axis}", f"{body}_velocity_{axis}") for part in PARTS for axis in AXES]
+    pairs = [(f"{body}_{part}_force_{axis}", f"{body}_velocity_{axis}") for part in FORCES for axis in AXES]
     pairs += [
         (f"{body}_{part}_torque{axis}", f"{body}_angular_velocity{axis}")
-        for part in PARTS
+        for part in FORCES
         for axis in ("", *(f"_{axis}" for axis in AXES))
     ]
     return -np.asarray(sum(history[load] * history[speed] for load, speed in pairs if load in history))

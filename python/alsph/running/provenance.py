@@ -9,17 +9,17 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from alsph.engine import simulation
+from alsph.engine import core
 
 
 def provenance(threads: int) -> dict[str, Any]:
     """Return versions, commit, threads, machine, command and the time of day, for ``run.json``."""
     return {
-        "versions": {"alsph": simulation.VERSION, "python": platform.python_version()}
+        "versions": {"alsph": core.VERSION, "python": platform.python_version()}
         | {name: version(name) for name in ("numpy", "h5py")},
         "commit": _commit(),
         "threads": threads,
-        "instructions": simulation.instructions(),
+        "instructions": core.instructions(),
         "machine": {
             "name": platform.node(),
             "system": platform.platform(),
