@@ -238,14 +238,11 @@ class DamBreak(FreeSurface):
 
     def outputs(self) -> list[Output]:
         """Return the records of the front and of the sensors in the end wall."""
-        if self.walls == "solid":
-            points = {
-                name: (np.array([self.end, each.height]), np.array([-1.0, 0]))
-                for name, each in SENSORS.items()
-                if each.diameter < 0.1  # solids tell of points
-            }
-            return [Front(self), WallSensors(points, 0, np.zeros(2), self.particle_spacing)]
         places = {name: self.disc(sensor.height, sensor.diameter) for name, sensor in SENSORS.items()}
+        if self.walls == "solid":
+            outward = np.array([-1.0, 0])
+            faces = {name: (points, outward) for name, points in places.items()}
+            return [Front(self), WallSensors(faces, 0, np.zeros(2), self.particle_spacing)]
         return [Front(self), Sensors(places, self.particle_spacing)]
 
     def disc(self, height: float, diameter: float) -> FloatArray:
@@ -253,7 +250,7 @@ class DamBreak(FreeSurface):
         count = max(3, math.ceil(2 * diameter / self.particle_spacing))
         across, up = diameter * (lattice(*[cell_centres(count, 1 / count)] * 2) - 0.5).T
         inside = np.hypot(across, up) < diameter / 2
-        wall = np.full(inside.sum(), self.tank_length)
+        wall = np.full(inside.sum(), self.end)
         sides = [self.width / 2 + across[inside]] if self.dimensions == 3 else []
         return np.stack([wall, *sides, height + up[inside]], axis=1)
 

@@ -22,12 +22,13 @@ class WallSensors(Series):
     """The pressure at sensors in a wall of solid particles over time, in a file of the run folder; they go with it.
 
     It is what the first row of solid particles nearby shows, that of the fluid around continued to them: a linear fit
-    along the wall.
+    along the wall, of a sensor with a size the mean over its points.
 
     Parameters
     ----------
     sensors
-        Place (d,) of each and normal (d,) out of the wall there at the start, by name.
+        Place (d,) of each, or points (k, d) over its extent, and normal (d,) out of the wall there at the start, by
+        name.
     body, center
         Number of the body that they are in, and its centre (d,).
     spacing
@@ -40,7 +41,10 @@ class WallSensors(Series):
     def __init__(
         self, sensors: Mapping[str, tuple[FloatArray, FloatArray]], body: int, center: FloatArray, spacing: float
     ) -> None:
-        self.points, self.normals = (np.array(each, float) for each in zip(*sensors.values(), strict=True))
+        places = [np.atleast_2d(np.asarray(place, float)) for place, _ in sensors.values()]
+        self.points, self.ends = np.concatenate(places), np.cumsum([*map(len, places)])[:-1]
+        normals = np.array([normal for _, normal in sensors.values()], float)
+        self.normals = np.repeat(normals, [*map(len, places)], axis=0)
         self.body, self.center, self.spacing = body, np.asarray(center, float), spacing
         super().__init__(["time [√(H/g)]", *(f"{name} [ρgH]" for name in sensors)])
 
@@ -64,7 +68,7 @@ class WallSensors(Series):
             along = away - into[:, None] * normal
             near = (np.abs(into) < 1) & (np.linalg.norm(along, axis=1) < NEAR) & (outward @ normal > ALIKE)
             found.append(_fitted(along[near], pressure[near]) if near.any() else np.nan)
-        return np.array(found)
+        return np.array([part.mean() for part in np.split(np.array(found), self.ends)])
 
 
 def _fitted(away: FloatArray, pressure: FloatArray) -> float:
