@@ -10,7 +10,7 @@ import argparse
 import json
 
 import numpy as np
-from alsph.arrays import FloatArray
+from alsph.analysis.energy import energy, largest_rise
 from alsph.cases import DamBreak
 from alsph.cases.dam_break import SENSORS, WINDOWS, impulse
 from alsph.geometry.particles import Kind
@@ -40,12 +40,12 @@ def course(case: DamBreak, seed: int) -> dict[str, float]:
         for start, end in WINDOWS
     }
     history = simulation.history()
-    energy: FloatArray = history["kinetic_energy"] + history["potential_energy"]
+    total = energy(history)
     met = way >= case.end - BESIDE * case.particle_spacing
     return found | {
         "impact": float(time[met.argmax()]),
-        "rise of the energy, %": 100 * float((energy - energy[0]).max() / energy[0]),
-        "energy at the end, %": 100 * float(energy[-1] / energy[0]),
+        "rise of the energy, %": 100 * largest_rise(history),
+        "energy at the end, %": 100 * float(total[-1] / total[0]),
         "particles lost": float(np.count_nonzero(state["kind"] == Kind.FLUID) - history["fluid"][-1]),
     }
 

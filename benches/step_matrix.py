@@ -2,11 +2,17 @@
 
 A square of 12 x 12 particles at rest in a tank of mirrors or of solids, without gravity; each velocity and pressure is
 disturbed in turn, and what a step makes of it is a column of the matrix. No modulus may be above 1, but for single
-precision. With `--weight` gravity acts, and the pressure is that of depth.
+precision. With `--weight` gravity acts, and the pressure is that of depth. `--set` changes settings of the engine:
+
+    python benches/step_matrix.py --scheme isph --set scheme.pressure_share=0
+    python benches/step_matrix.py --scheme explicit_isph --set scheme.sweeps=40 projection_sweeps=0
 """
 
 import argparse
+import functools
 import itertools
+import json
+import operator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -26,12 +32,25 @@ class Square(FreeSurface):
 
     gravity: ClassVar[bool] = False
     tension: ClassVar[bool] = True
+    changes: ClassVar[dict[str, Any]] = {}
+    """Settings of the engine by their path, and their values."""
     solids: bool = False
 
     def domain(self) -> Domain:
         """Return the tank."""
         side = "none" if self.solids else "slip"
         return Domain((0, 0), (1, 2), [(side, side), (side, "air")])
+
+    def settings(self) -> dict[str, Any]:
+        """Return the engine's settings with the changes."""
+        found = super().settings()
+        for path, value in self.changes.items():
+            *tables, name = path.split(".")
+            table = functools.reduce(operator.getitem, tables, found)
+            if name not in table:
+                raise SystemExit(f"--set {path}: no such setting; there are {', '.join(table)}")
+            table[name] = value
+        return found
 
     def bodies(self) -> list[SolidBody]:
         """Return its walls."""
@@ -79,9 +98,13 @@ def radius(case: Square, disorder: float) -> float:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--weight", action="store_true", help="with gravity")
-    model = Heavy if parser.parse_args().weight else Square
+    parser.add_argument("--scheme", nargs="*", default=Square.schemes(), help="(all)")
+    parser.add_argument("--set", nargs="*", default=[], metavar="NAME=VALUE", help="settings of the engine")
+    options = parser.parse_args()
+    model = Heavy if options.weight else Square
+    model.changes = {path: json.loads(value) for path, _, value in (each.partition("=") for each in options.set)}
     for scheme, solids, gradient, disorder in itertools.product(
-        model.schemes(), (False, True), ("adjoint", "conservative"), (0.0, 0.1)
+        options.scheme, (False, True), ("adjoint", "conservative"), (0.0, 0.1)
     ):
         # What a solve leaves is no linear function of the state.
         own = {"solver_tolerance": 1e-12} if scheme == "isph" else {}

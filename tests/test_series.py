@@ -179,10 +179,46 @@ def test_sensors_in_walls_of_solids_fit_what_these_show(made, resolution):
     state = simulation.state()
     slope = np.array([0, 0.7, 0.4])[: case.space_dimensions]
     simulation.restore(state | {"pressure": 3 - state["position"] @ slope})
-    exact = [part.mean() for part in np.split(3 - sensors.points @ slope, sensors.ends)]
+    exact = [np.average(3 - points @ slope, weights=weights) for points, weights, _ in sensors.sensors]
     assert sensors.values(simulation) == pytest.approx(exact, abs=1e-9)
     simulation.restore(state | {"pressure": 0 * state["pressure"]})
     assert (sensors.values(simulation) == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("begun", "row"), [("time [s],two [-]\n1,2\n", "3,2"), ("time [s],old [-],two [-]\n", "3,nan,2"), ("1,1\n", "3,3")]
+)
+def test_a_series_that_an_older_version_began_goes_on_with_its_columns(tmp_path, begun, row):
+    """Where columns were added, taken away or not named."""
+    path = tmp_path / Count.file
+    path.write_text(begun)
+    recorded(path, [3.0])
+    assert path.read_text() == f"{begun}{row}\n"
+    assert Count.read(Record(tmp_path))[0][-1] == 3.0
+
+
+WATERS = [model for model in cases.CASES.values() if issubclass(model, cases.FreeSurface)]
+
+
+@pytest.mark.parametrize("model", WATERS, ids=lambda model: model.name)
+def test_gauges_of_each_case_tell_the_volume_of_its_water(model):
+    """The integral of the depth over the floor, and at the sides as much as half a column off them."""
+    case = model(resolution=10)
+    if not case.has_depth:
+        with pytest.raises(ConfigError, match="no gauges"):
+            _ = Config(case, RunSettings(gauges="0.5" if case.space_dimensions == 2 else "0.5,0.5")).gauges
+        return
+    state, domain, spacing = case.particles(), case.checked_domain, case.particle_spacing
+    water = state["position"][state["kind"] == 0]
+    axes = [
+        np.linspace(low, high, round(2 * (high - low) / spacing) + 1)
+        for low, high in zip(domain.lower[:-1], domain.upper[:-1], strict=True)
+    ]
+    depth = Levels(lattice(*axes) if len(axes) > 1 else axes[0], domain, spacing).depth(water)
+    depth = depth.reshape([*map(len, axes)])
+    for axis in reversed(axes):
+        depth = np.trapezoid(depth, axis, axis=-1)
+    assert depth == pytest.approx(len(water) * spacing**case.space_dimensions, rel=1e-3)
 
 
 def test_a_sensor_above_a_single_row_feels_that_row():
@@ -350,6 +386,9 @@ def test_gauges_of_a_run_tell_what_its_snapshots_have(tmp_path):
         assert found.depth[-1] == pytest.approx(levels.depth(last), abs=1e-6)  # snapshots are in single precision
         if dimensions == "2":
             assert np.trapezoid(found.depth, found.position[:, 0], axis=1) == pytest.approx(1.0, rel=2e-3)
+        axes = whole.plot_gauges().axes[0]
+        assert len(axes.lines) == min(10, len(found.position)) and axes.get_xlabel() == r"$t\sqrt{g/H}$"
+        assert axes.lines[-1].get_ydata() == pytest.approx(found.depth[:, -1])
     text = (tmp_path / "3" / "gauges.csv").read_text()
     assert text.splitlines()[0].endswith("depth at x = 1.5 H; y = 0.1 H [H]")
 
@@ -366,8 +405,10 @@ def test_gauges_beside_the_topmost_row_of_a_wave(tmp_path):
 @pytest.mark.parametrize(
     ("case", "gauges", "message"),
     [
-        (cases.Cylinder(), "1", "cylinder has no water that lies on a floor"),
-        (cases.EllipticalDrop(), [0.5], "no water that lies on a floor"),
+        (cases.Cylinder(), "1", "cylinder takes no gauges"),
+        (cases.EllipticalDrop(), [0.5], "takes no gauges"),
+        (cases.DamBreak(), "0:1:1", "'0:1:1' is no line, which is X:X:COUNT .* COUNT from 2 to 10000"),
+        (cases.DamBreak(dimensions=3), "0:1:1", "must be two finite numbers"),
         (cases.DamBreak(), "0.5,1", "must be a finite number, x"),
         (cases.DamBreak(), "6", r"\[6.0\] lies outside of the domain, \[0.0\] to \[5.366\] \[H\]"),
         (cases.DamBreak(dimensions=3), "1", "must be two finite numbers"),

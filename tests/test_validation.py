@@ -70,12 +70,12 @@ def test_orders_and_verdict_of_synthetic_errors(finished, monkeypatch):
     report = validate(suite=FAST, output=finished.path, progress=False)
     assert [row.order for row in report.rows[2:]] == pytest.approx([2.0, 1.0])
     assert [row.measure.name for row in report.rows] == ["second order", "first order"] * 2
-    assert report.passed and report.verdict == "Passed: 2 of 2 checks."
+    assert report.passed and report.verdict == "All well: 2 of 2 checks passed."
     assert report.rows[2].cells[6:] == ("+1 %", "2 %", "2.0", "pass")
     assert report.rows[0].cells[6:] == ("+4 %", "2 %", "", "")
     measuring(monkeypatch, lambda resolution: [*measures(resolution), Measure("wrong", math.nan, 1.0, 0.1, "exact")])
     report = validate(suite=FAST, output=finished.path, progress=False)
-    assert not report.passed and report.verdict == "FAILED: 2 of 3 checks."
+    assert not report.passed and report.verdict == "FAILED: 2 of 3 checks passed."
     assert report.rows[-1].cells[-1] == "FAIL"
     measuring(monkeypatch, lambda resolution: [])
     assert not validate(suite=FAST, output=finished.path, progress=False).passed
@@ -167,12 +167,12 @@ def test_command_line(fast, alsph, tmp_path, monkeypatch):
     code, stdout, _ = alsph("validate", "taylor_green", "--resolution", 12, "--resolution", 16, *options)
     assert "run 2 of 2: taylor_green, resolution 16; ETA of all" in stdout
     assert str(tmp_path / "out" / "report.md") in stdout
-    assert code == (0 if "Passed: 2 of 2" in stdout else 1)
+    assert code == (0 if "All well: 2 of 2" in stdout else 1)
     measuring(monkeypatch, lambda resolution: [Measure("energy", 1.0, 1.0, STRICT, "exact")])
     assert alsph("validate", *options)[0] == 0
     measuring(monkeypatch, lambda resolution: [Measure("energy", 1.1, 1.0, STRICT, "exact")])
     code, stdout, _ = alsph("validate", *options)
-    assert (code, "FAILED: 0 of 1 checks." in stdout) == (1, True)
+    assert (code, "FAILED: 0 of 1 checks passed." in stdout) == (1, True)
 
 
 @pytest.mark.parametrize(

@@ -241,7 +241,8 @@ class Config:
             If the case has no water that lies in a tank, or they are no places of the domain.
         """
         if self.run.gauges and not self.case.has_depth:
-            raise ConfigError(f"run.gauges: {self.case.name} has no water that lies on a floor; leave them out")
+            told = "no gauges: it has no water that lies on a floor at rest"
+            raise ConfigError(f"run.gauges = {shown(self.run.gauges)}: {self.case.name} takes {told}; leave them out")
         return self._within("gauges", self.case.space_dimensions - 1)
 
     def _within(self, setting: str, dimensions: int) -> FloatArray:

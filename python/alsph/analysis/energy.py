@@ -26,6 +26,12 @@ def energy(history: Mapping[str, FloatArray]) -> FloatArray:
     return np.asarray(history.get("kinetic_energy", unknown) + history.get("potential_energy", unknown))
 
 
+def largest_rise(history: Mapping[str, FloatArray]) -> float:
+    """Return the largest rise of the energy above its least value before, over its start."""
+    total = energy(history)
+    return float((total - np.minimum.accumulate(total)).max() / np.abs(total[0]))
+
+
 def taken(history: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """Return what each part of the step has taken of it since the first one (n,) [ρU²D^d], by its name.
 

@@ -89,5 +89,7 @@ def _line(text: str, dimensions: int, setting: str) -> FloatArray:
     if not rest:
         return first[None]
     if len(rest) != 2 or not re.fullmatch("[0-9]{1,5}", rest[1]) or not 2 <= int(rest[1]) <= MOST_POINTS:
-        raise ConfigError(f"{setting}: {shown(text)} is no line, which is X,Y:X,Y:COUNT from one point to another")
+        point = ",".join("XYZ"[:dimensions])
+        told = f"{point}:{point}:COUNT from one point to another, COUNT from 2 to {MOST_POINTS}"
+        raise ConfigError(f"{setting}: {shown(text)} is no line, which is {told}")
     return np.linspace(first, checked_point(setting, rest[0].split(","), dimensions, text), int(rest[1]))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
-from alsph.analysis.energy import PARTS, energy, taken
+from alsph.analysis.energy import PARTS, energy, largest_rise, taken
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
 from alsph.analysis.sampling import pressure_on_walls
@@ -51,7 +51,8 @@ class Levels(Series):
     gauges
         Their places along x, in 3-D along x and y (m, 2) [D].
     domain
-        The tank; beyond its sides the water goes on as in a mirror, or from the opposite one where they are periodic.
+        The tank; beyond its sides the water goes on as in a mirror, or from the opposite one where they are periodic,
+        but not beyond those that are open to the air.
     spacing
         Particle spacing Δx [D].
     symbols
@@ -93,11 +94,12 @@ class Levels(Series):
             raise ConfigError(f"gauges: they are of a tank in {self.domain.dimensions}-D")
         share = np.ones((len(self.gauges), len(position)))
         for axis in range(self.gauges.shape[1]):
-            along, low, high = position[:, axis], self.domain.lower[axis], self.domain.upper[axis]
+            along, sides = position[:, axis], (self.domain.lower[axis], self.domain.upper[axis])
             if self.domain.periodic[axis]:
-                images = along + (high - low) * np.array([[0], [-1], [1]])
+                images = along + (sides[1] - sides[0]) * np.array([[0], [-1], [1]])
             else:
-                images = np.stack([along, 2 * low - along, 2 * high - along])
+                closed = [side for side, kind in zip(sides, self.domain.boundaries[axis], strict=True) if kind != "air"]
+                images = np.stack([along, *(2 * side - along for side in closed)])
             away = np.abs(images - self.gauges[:, None, [axis]]) / (4 * self.spacing)
             share *= np.where(away < 1, 1 + np.cos(np.pi * away), 0.0).sum(axis=1) / 8
         return np.asarray(share.sum(axis=1) * self.spacing)
@@ -314,8 +316,6 @@ class FreeSurface(Case):
         moved = "forcing" in self.rules or any(body.moves or body.rigid for body in self.checked_bodies)
         if moved or not len(run.history.get("potential_energy", [])):
             return []
-        total = energy(run.history)
-        start = np.abs(total[0])
-        rise = (total - np.minimum.accumulate(total)).max() / start
+        start = np.abs(energy(run.history)[0])
         lost = [Measure(TAKEN + name, float(part[-1] / start)) for name, part in taken(run.history).items()]
-        return [Measure(ENERGY, float(rise), 0.0, 0.01, "energy is only lost"), *lost]
+        return [Measure(ENERGY, largest_rise(run.history), 0.0, 0.01, "energy is only lost"), *lost]

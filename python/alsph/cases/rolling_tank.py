@@ -109,6 +109,11 @@ class RollingTank(FreeSurface):
         water = self.fluid(position, np.zeros_like(position), 1 - position[:, 1])
         return join(water, tank.particles())
 
+    @property
+    def has_depth(self) -> bool:
+        """Not for gauges, which stay where they are."""
+        return False
+
     def outputs(self) -> list[Output]:
         """Return the record of the sensors in the end walls."""
         half = self.size[0] / 2

@@ -41,34 +41,37 @@ class WallSensors(Series):
     def __init__(
         self, sensors: Mapping[str, tuple[FloatArray, FloatArray]], body: int, center: FloatArray, spacing: float
     ) -> None:
-        places = [np.atleast_2d(np.asarray(place, float)) for place, _ in sensors.values()]
-        self.points, self.ends = np.concatenate(places), np.cumsum([*map(len, places)])[:-1]
-        normals = np.array([normal for _, normal in sensors.values()], float)
-        self.normals = np.repeat(normals, [*map(len, places)], axis=0)
+        self.sensors = [
+            (*np.unique(np.atleast_2d(np.asarray(place, float)), axis=0, return_counts=True), np.asarray(normal, float))
+            for place, normal in sensors.values()
+        ]
         self.body, self.center, self.spacing = body, np.asarray(center, float), spacing
         super().__init__(["time [√(H/g)]", *(f"{name} [ρgH]" for name in sensors)])
 
     def values(self, simulation: Simulation) -> FloatArray:
         """Return the present pressures (m,); NaN at a sensor without solid particles."""
-        state, dimensions = simulation.state(), self.points.shape[1]
-        points, normals = self.points, self.normals
+        state, dimensions = simulation.state(), len(self.center)
+        way, turn = np.zeros(dimensions), np.eye(dimensions)
         if "pose" in state:
             from scipy.spatial.transform import Rotation  # takes its time
 
-            way, angle = state["pose"][self.body, :3], state["pose"][self.body, 3:6]
+            way, angle = state["pose"][self.body, :dimensions], state["pose"][self.body, 3:6]
             turn = Rotation.from_rotvec(angle).as_matrix()[:dimensions, :dimensions]
-            points = self.center + way[:dimensions] + (points - self.center) @ turn.T
-            normals = normals @ turn.T
         solid = (state["kind"] == Kind.SOLID) & (state["body"] == self.body)
         place, outward, pressure = (state[name][solid] for name in ("position", "normal", "pressure"))
+        place, outward = self.center + (place - self.center - way) @ turn, outward @ turn  # as at the start
         found = []
-        for point, normal in zip(points, normals, strict=True):
-            away = (place - point) / self.spacing
-            into = away @ normal
-            along = away - into[:, None] * normal
-            near = (np.abs(into) < 1) & (np.linalg.norm(along, axis=1) < NEAR) & (outward @ normal > ALIKE)
-            found.append(_fitted(along[near], pressure[near]) if near.any() else np.nan)
-        return np.array([part.mean() for part in np.split(np.array(found), self.ends)])
+        for points, weights, normal in self.sensors:
+            face = (np.abs((place - points[0]) @ normal) < self.spacing) & (outward @ normal > ALIKE)
+            values = [self._felt(place[face] - point, normal, pressure[face]) for point in points]
+            found.append(np.average(values, weights=weights))
+        return np.array(found)
+
+    def _felt(self, away: FloatArray, normal: FloatArray, pressure: FloatArray) -> float:
+        """Return the pressure at a point, of solids (n, d) away from it [D] in the face; NaN without any nearby."""
+        along = (away - (away @ normal)[:, None] * normal) / self.spacing
+        near = np.linalg.norm(along, axis=1) < NEAR
+        return _fitted(along[near], pressure[near]) if near.any() else np.nan
 
 
 def _fitted(away: FloatArray, pressure: FloatArray) -> float:

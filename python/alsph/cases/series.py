@@ -18,7 +18,8 @@ from alsph.engine.simulation import Simulation
 class Series(ABC):
     """Numbers over time in a CSV file of the run folder, an :class:`alsph.engine.output.Output`.
 
-    A line that names the columns comes first; files of older versions have none, and are read and go on as they are.
+    A line that names the columns comes first. A file that an older version began has its own columns, or no line that
+    names them, and goes on so.
 
     Parameters
     ----------
@@ -38,7 +39,7 @@ class Series(ABC):
 
     def __init__(self, columns: Sequence[str]) -> None:
         self.columns = columns
-        self.rows: list[str] = []
+        self.rows: list[list[str]] = []
 
     @abstractmethod
     def values(self, simulation: Simulation) -> FloatArray:
@@ -46,15 +47,20 @@ class Series(ABC):
 
     def record(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> None:
         """Keep them."""
-        numbers = simulation.time, *self.values(simulation)
-        self.rows.append(",".join(map(_digits, numbers)) + "\n")
+        self.rows.append([*map(_digits, (simulation.time, *self.values(simulation)))])
 
     def append(self, path: Path) -> None:
         """Append what has been kept to the file."""
-        with path.open("a", encoding="utf-8") as file:
+        with path.open("a+", encoding="utf-8") as file:
             if not file.tell():
                 file.write(",".join(self.columns) + "\n")
-            file.writelines(self.rows)
+            file.seek(0)
+            head = file.readline().rstrip("\n").split(",")
+            places = [self.columns.index(name) if name in self.columns else None for name in head]
+            named = any(place is not None for place in places)
+            for row in self.rows:
+                kept = ["nan" if place is None else row[place] for place in places] if named else row[: len(head)]
+                file.write(",".join(kept) + "\n")
         self.rows = []
 
     def truncate(self, path: Path, time: float) -> None:

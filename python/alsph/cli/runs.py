@@ -184,6 +184,8 @@ def _drawings(run: "alsph.Run", bodies: list[str]) -> dict[str, Callable[[], Any
         profile.file_name: functools.partial(run.plot_profile, profile) for profile in run.profiles
     }
     drawings["ledger"] = run.plot_ledger
+    if len(run.gauges.time):
+        drawings["gauges"] = run.plot_gauges
     settles = run.config.case.settles
     if run.body:
         drawings |= {"forces": run.plot_forces} | ({"spectrum": run.plot_spectrum} if settles else {})

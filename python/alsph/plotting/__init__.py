@@ -1,7 +1,7 @@
 """Figures of runs and of their fields, as pure functions: results in, :class:`matplotlib.figure.Figure` out."""
 
 from alsph.plotting.animation import Film, animate
-from alsph.plotting.curves import Curve, convergence, panels, pressure_coefficient, profile
+from alsph.plotting.curves import Curve, convergence, gauges, panels, pressure_coefficient, profile
 from alsph.plotting.histories import coefficients, forces, ledger, spectrum
 from alsph.plotting.pictures import FIELDS, extent_of, field, field_style, fields
 from alsph.plotting.style import PALETTE, head, remark, rename, save
@@ -19,6 +19,7 @@ __all__ = [
     "field_style",
     "fields",
     "forces",
+    "gauges",
     "head",
     "ledger",
     "panels",

@@ -11,6 +11,7 @@ import numpy as np
 
 from alsph.analysis.loads import PressureCoefficient
 from alsph.analysis.measures import Profile
+from alsph.analysis.probes import GaugeRecord
 from alsph.analysis.window import DEVELOPING
 from alsph.arrays import FloatArray
 from alsph.geometry.surface import Surface
@@ -20,6 +21,9 @@ from alsph.text import in_figure
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+MOST_GAUGES = 10
+"""Of which a figure shows the depth."""
 
 
 def pressure_coefficient(
@@ -129,6 +133,22 @@ def profile(curves: dict[str, Profile]) -> Figure:
     axes.grid(alpha=0.3)
     axes.legend(fontsize="small" if len(known) > 1 else None)
     return figure
+
+
+def gauges(record: GaugeRecord) -> Figure:
+    """Draw the depth of the water over time, of ten gauges where there are more."""
+    count = len(record.position)
+    shown = np.unique(np.linspace(0, count - 1, min(count, MOST_GAUGES)).round().astype(int))
+    title = "depth at the gauges" + (f", {len(shown)} of {count}" if len(shown) < count else "")
+    nothing = (np.empty(0), np.empty(0))
+    return profile(
+        {
+            ", ".join(f"${axis}/D$ = {at:g}" for axis, at in zip("xy", record.position[index], strict=False)): Profile(
+                title, ("$tU/D$", "depth over $D$"), (record.time, record.depth[:, index]), nothing, ""
+            )
+            for index in shown
+        }
+    )
 
 
 @dataclass(frozen=True)

@@ -114,7 +114,7 @@ def field(
     _draw_field(axes, snapshot, name, spacing, part, limit, plane)
     if flow is not None:
         _draw_streamlines(axes, flow, part, plane)
-    where = f"${AXES[plane.axis]}/D$ = {plane.place:g}, " if plane else ""
+    where = f"${AXES[plane.axis]}/D$ = {plane.place:.3g}, " if plane else ""
     axes.set_title(f"{title}, " * bool(title) + where + f"{TIME_LABEL} = {snapshot.time:.2f}")
     return figure
 

@@ -345,6 +345,10 @@ class Run(Loads):
         """Figure of one of :attr:`profiles` beside its reference; saved if `path` is given."""
         return self._saved(_plotting().profile({"computed": profile}), path)
 
+    def plot_gauges(self, path: str | Path | None = None) -> Figure:
+        """Figure of the depth at the run's gauges over time, of ten where there are more; saved if `path` is given."""
+        return self._saved(_plotting().gauges(self.gauges), path)
+
     def plot_ledger(self, path: str | Path | None = None) -> Figure:
         """Figure of divergence, iterations, time step, volume, mass and energy over time; saved if `path` is given."""
         return self._saved(_plotting().ledger(self), path)

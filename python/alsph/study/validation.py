@@ -213,7 +213,7 @@ class Report:
     def verdict(self) -> str:
         """The outcome in a sentence."""
         judged = [row.measure.passed for row in self.rows if row.judged]
-        return f"{'Passed' if self.passed else 'FAILED'}: {sum(judged)} of {len(judged)} checks."
+        return f"{'All well' if self.passed else 'FAILED'}: {sum(judged)} of {len(judged)} checks passed."
 
     def __str__(self) -> str:
         """Return the table and the verdict."""
