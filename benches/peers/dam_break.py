@@ -1,6 +1,6 @@
 """A dam break in 2-D to t = 2 √(H/g), with alsph's schemes and with PySPH's: CPU seconds of one core, and the front.
 
-The tank is that of alsph's case, in PySPH with walls of particles. The front is the particle that is farthest, beside
+The tank is that of alsph's case, with mirrors for walls and with solids, in PySPH with walls of particles. The front is the particle that is farthest, beside
 that of the inviscid computation with 400 particles over H. PySPH runs in an environment of its own, set up on first
 use; its IISPH did not end in twelve minutes with 40 particles over H.
 
@@ -21,14 +21,15 @@ from codes import ENVIRONMENTS, measure
 TIMES = 1.0, 2.0
 
 SCHEMES = {
-    "alsph": ("alsph", "isph", "explicit_isph", "wcsph", "edac"),
+    "alsph": ("alsph", "alsph, walls of solids", "isph", "explicit_isph", "wcsph", "edac"),
     "pysph": ("wcsph", "aha", "edac", "sisph"),
 }
 
 
 def alsph_row(scheme: str, resolution: int) -> dict:
     """Return what alsph takes and comes to."""
-    case = alsph.cases.DamBreak(resolution=resolution, scheme=scheme)
+    name, _, solids = scheme.partition(", ")
+    case = alsph.cases.DamBreak(resolution=resolution, scheme=name, walls="solid" if solids else "slip")
     start, fronts = time.process_time(), []
     simulation = case.simulation(threads=1)
     for at in TIMES:
