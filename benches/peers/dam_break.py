@@ -1,8 +1,8 @@
 """A dam break in 2-D to t = 2 √(H/g), with alsph's schemes and with PySPH's: CPU seconds of one core, and the front.
 
-The tank is that of alsph's case, with mirrors for walls and with solids, in PySPH with walls of particles. The front is the particle that is farthest, beside
-that of the inviscid computation with 400 particles over H. PySPH runs in an environment of its own, set up on first
-use; its IISPH did not end in twelve minutes with 40 particles over H.
+The tank is that of alsph's case, with mirrors for walls and with solids, in PySPH with walls of particles. The front is
+the particle that is farthest, beside that of the inviscid computation with 400 particles over H. PySPH runs in an
+environment of its own, set up on first use; its IISPH did not end in twelve minutes with 40 particles over H.
 
     python benches/peers/dam_break.py                    # a quarter of an hour
     python benches/peers/dam_break.py --resolutions 20
