@@ -276,7 +276,8 @@ def _raster(
         return picture, np.zeros_like(picture), scaled
     body = sampling.fill(snapshot.position[~fluid], points, spacing)
     if plane is not None:  # which may be one that the flow is computed on one side of
-        body = body / np.maximum(body + sampling.fill(snapshot.position[fluid], points, spacing), 0.1)
+        least = 0.3 if meets_air(whole) else 0.1  # a body in the air ends near its own surface
+        body = body / np.maximum(body + sampling.fill(snapshot.position[fluid], points, spacing), least)
     body = body.reshape(rows, columns)
     from scipy.ndimage import binary_fill_holes
 
