@@ -250,7 +250,7 @@ class Config:
         name, domain = f"run.{setting}", self.case.checked_domain
         found = points(getattr(self.run, setting) or [], dimensions, name)
         lower, upper = (list(corner[:dimensions]) for corner in (domain.lower, domain.upper))
-        for point in found[((found < lower) | (found > upper)).any(axis=1)]:
+        for point in found[~domain.contains(found)]:
             told = f"{name}: {point.tolist()} lies outside of the domain, {lower} to {upper} [D]"
             raise ConfigError(self.case.symbols(told))
         return found

@@ -111,8 +111,9 @@ class Domain:
         return found
 
     def contains(self, points: FloatArray, margin: float = 0.0) -> NDArray[np.bool_]:
-        """Return which of the points (m, d) lie in it, or at most `margin` beyond it [D]."""
-        inside = (points >= np.array(self.lower) - margin) & (points <= np.array(self.upper) + margin)
+        """Return which points (m, d) lie in it, or at most `margin` beyond it [D]; d may be fewer than its own."""
+        lower, upper = (np.array(corner[: points.shape[1]]) for corner in (self.lower, self.upper))
+        inside = (points >= lower - margin) & (points <= upper + margin)
         return np.asarray(inside.all(axis=1))
 
     def settings(self) -> dict[str, Any]:
