@@ -95,9 +95,15 @@ fn largest_volume(settings: &Settings) -> f64 {
 }
 
 /// The least depth under the surface of a body that particle `i` can have, as the solid particles around it tell: a place
-/// at a distance from one is no less deep than it by more than that.
+/// at a distance from one is no less deep than it by more than that. Which holds for the surface nearest to it; the depth
+/// under the other face of a thin part, beside whose edge the fluid may be nearer, counts for fluid within Δx alone.
 fn depth<const D: usize>(settings: &Settings, particles: &Particles<D>, frame: &Frame<D>, i: usize) -> f64 {
-    let least = |j: usize| particles.depth[j] - (particles.position[j] - particles.position[i]).norm();
+    let Particles { position, depth, .. } = particles;
+    let least = |j: usize| {
+        let away = (position[j] - position[i]).norm();
+        let other = frame.faces.twin(j).filter(|_| away > settings.particle_spacing);
+        other.map_or(depth[j], |twin| depth[j].min(depth[twin])) - away
+    };
     let (row, lane) = frame.stencil.neighbours.row(i);
     if row.solid().is_empty() {
         return 0.0;

@@ -49,7 +49,8 @@ impl<const D: usize> Faces<D> {
         self.twin.is_empty()
     }
 
-    fn twin(&self, i: usize) -> Option<usize> {
+    /// The particle of the other face at the same place, if there is one.
+    pub fn twin(&self, i: usize) -> Option<usize> {
         self.twin.get(i).map(|&twin| twin as usize).filter(|&twin| twin != i)
     }
 

@@ -79,11 +79,15 @@ def loads(case: Case, start: float, until: float, every: float = 0.05, threads: 
 
 
 def body(shape: str, **options: Any) -> Body:
-    """Return the case of a shape by name: ``plate_T`` and ``ellipse_T`` are T thick, the plate across the stream."""
+    """Return the case of a shape by name: ``plate_T``, ``wedge_T`` and ``ellipse_T`` are T thick, the plate across the
+    stream, the wedge with its edge to it.
+    """
     name, _, thickness = shape.partition("_")
     if name in ("circle", "ellipse"):
         circle = shapely.Point(0, 0).buffer(0.5, quad_segs=64)
         outline = affinity.scale(circle, 1.0, float(thickness or 1.0))
+    elif name == "wedge":
+        outline = shapely.Polygon([(0.0, 0.0), (1.0, -float(thickness) / 2), (1.0, float(thickness) / 2)])
     elif name == "plate":
         outline = shapely.box(-float(thickness) / 2, -0.5, float(thickness) / 2, 0.5)
     else:
