@@ -98,7 +98,7 @@ PYTHON_FLOORS = (
     ("_alsph", "arrays", "text"),
     ("errors",),
     ("memory", "parameters", "tables", "expressions", "symbols"),
-    ("geometry", "reference", "units"),
+    ("geometry", "reference", "run_settings", "units"),
     ("analysis", "engine"),
     ("cases", "folder"),
     ("config",),

@@ -404,7 +404,7 @@ class Case(Driven):
         retry
             How often a run that breaks down goes back to a checkpoint and on with half the time step.
         **settings
-            Further settings of :class:`alsph.config.RunSettings`, such as ``output_interval``.
+            Further settings of :class:`alsph.run_settings.RunSettings`, such as ``output_interval``.
 
         Raises
         ------

@@ -1,6 +1,6 @@
 """The command line: ``alsph run | resume | repeat | describe | info | watch | plot | validate | study | ...``.
 
-The options of ``run`` and ``describe`` are the fields of the case and of :class:`alsph.config.RunSettings`.
+The options of ``run`` and ``describe`` are the fields of the case and of :class:`alsph.run_settings.RunSettings`.
 """
 
 import signal

@@ -14,15 +14,16 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import typer
 from typer.main import get_command
 
-from alsph import cases, config
+from alsph import cases, config, run_settings
 from alsph.cases.driven import RULES
 from alsph.cases.method import OWN, Method
 from alsph.cli.common import WORDS, number_of, one_of
 from alsph.cli.help import App, Group
 from alsph.cli.terminal import exit_codes
-from alsph.config import Config, RunSettings
+from alsph.config import Config
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters, describe_default
+from alsph.run_settings import RunSettings
 from alsph.symbols import Symbols
 from alsph.units import Units
 
@@ -140,7 +141,7 @@ def _without_effect(case: cases.Case) -> set[str]:
         "surface_interval": case.surface_points(),
         "initial_run": not domain.meets_air,
         **dict.fromkeys(("gauges", "gauge_interval"), case.has_depth),
-        **dict.fromkeys(config.OF_CONVERGED, case.is_averaged),
+        **dict.fromkeys(run_settings.OF_CONVERGED, case.is_averaged),
     }
     return {name for name, on in acts.items() if not on}
 
@@ -220,12 +221,12 @@ def _options(
 def _told(model: type[Parameters], name: str, idle: Collection[str]) -> str:
     """Return what is told of a parameter: of `until` only what the case can do."""
     text = model.describe(name)
-    return text if _converges(idle) else text.replace(config.OR_CONVERGED, "")
+    return text if _converges(idle) else text.replace(run_settings.OR_CONVERGED, "")
 
 
 def _converges(idle: Collection[str]) -> bool:
     """Whether runs of the case may end when their averages are known well enough."""
-    return not {*config.OF_CONVERGED} <= {*idle}
+    return not {*run_settings.OF_CONVERGED} <= {*idle}
 
 
 def _default(model: type[Parameters], name: str, required: str) -> str:

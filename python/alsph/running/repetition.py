@@ -13,6 +13,7 @@ from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.folder import checkpoint
 from alsph.folder.history import UNKNOWN, flatten, lines
 from alsph.folder.run_folder import START, RunFolder
+from alsph.run_settings import RunSettings
 from alsph.running import beginning
 from alsph.running.progress import Reporter
 from alsph.running.provenance import provenance
@@ -144,7 +145,7 @@ def _begun(first: Config, last: Config, threads: int | None, folder: RunFolder, 
     return simulation
 
 
-def _case(tables: Any, settings: config.RunSettings, folder: RunFolder) -> Config:
+def _case(tables: Any, settings: RunSettings, folder: RunFolder) -> Config:
     try:
         return Config(config.from_tables(tables, folder.path, Path()).case, settings)
     except (ConfigError, TypeError) as error:

@@ -8,13 +8,14 @@ from typing import Any
 from alsph import config
 from alsph.arrays import size_of
 from alsph.cases.base import Case
-from alsph.config import Config, Converged, RunSettings, of_run, of_the_flow
+from alsph.config import Config, of_run, of_the_flow
 from alsph.engine.prescribed import difference
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.folder.checkpoint import Checkpoint
 from alsph.folder.run_folder import RunFolder
 from alsph.geometry.shape import Shape
 from alsph.results.run import Run
+from alsph.run_settings import Converged, RunSettings
 from alsph.running import beginning
 from alsph.running.control import Control
 from alsph.running.driver import Driver
@@ -48,7 +49,7 @@ def start(config: Config, path: Path, control: Control | None = None, *, force: 
 
 
 def run(case: Case, folder: Path, control: Control | None = None, *, force: bool = False, **settings: Any) -> Run:
-    """Run a case with settings of :class:`alsph.config.RunSettings`: what :meth:`alsph.cases.Case.run` does."""
+    """Run a case with settings of :class:`alsph.run_settings.RunSettings`: what :meth:`alsph.cases.Case.run` does."""
     return start(Config(case, RunSettings(**settings)), folder, control, force=force)
 
 

@@ -259,8 +259,8 @@ def compare_schemes(
     progress
         Report progress.
     **parameters
-        Parameters of the case and settings of its runs (:class:`alsph.config.RunSettings`), in place of those that it
-        has. One that belongs to some schemes, such as ``penalty_constant``, is given to these alone.
+        Parameters of the case and settings of its runs (:class:`~alsph.run_settings.RunSettings`), in place of those
+        that it has. One that belongs to some schemes, such as ``penalty_constant``, is given to these alone.
 
     Raises
     ------

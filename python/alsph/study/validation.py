@@ -15,10 +15,11 @@ from alsph import cases, plotting
 from alsph.analysis import averages
 from alsph.analysis.measures import Measure
 from alsph.cases.remarks import keywords
-from alsph.config import Config, RunSettings
+from alsph.config import Config
 from alsph.errors import ConfigError, SolverError
 from alsph.folder.durable import write_text
 from alsph.results.run import Run
+from alsph.run_settings import RunSettings
 from alsph.running.control import Control
 from alsph.running.start import complete
 from alsph.tables import markdown
