@@ -12,8 +12,8 @@ import shapely
 from alsph import Domain, SolidBody, Units, cases, plotting, reference
 from alsph.analysis.energy import PARTS, energy, taken
 from alsph.analysis.measures import Measure
-from alsph.cases.base import VELOCITY_LIMIT
 from alsph.cases.dam_break import column_pressure
+from alsph.cases.discretised import VELOCITY_LIMIT
 from alsph.cases.free_surface import ENERGY
 from alsph.cases.heave import linear_heave
 from alsph.cases.heaving_cylinder import MASS, SECTION

@@ -12,31 +12,22 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
-from alsph.cases.driven import RULES, Driven
+from alsph.cases.discretised import Discretised
+from alsph.cases.driven import RULES
 from alsph.cases.method import Method
-from alsph.engine.core import bytes_per_particle, time_step_limits
 from alsph.engine.output import Output
 from alsph.engine.problem import Problem
 from alsph.engine.simulation import Simulation
-from alsph.errors import ConfigError
-from alsph.geometry.domain import SolidBody
 from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
-from alsph.memory import check
-from alsph.symbols import GENERAL, Symbols
 
 if TYPE_CHECKING:
     from alsph.results.run import Run
-
-VELOCITY_LIMIT = 50.0
-"""Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
-
 
 WORD = re.compile(r"(?<=[a-z0-9])(?=[A-Z][a-z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[a-z])(?=[A-Z])")
 """Where a new word begins in the name of a class."""
@@ -53,7 +44,7 @@ def title_of(model: type) -> str:
     return first[:1].lower() + first[1:] or name_of(model)
 
 
-class Case(Driven):
+class Case(Discretised):
     """A flow problem with its numerical parameters.
 
     Every case is computed in its own reference units: lengths in D, velocities in U, density in ρ, hence times in D/U,
@@ -63,10 +54,6 @@ class Case(Driven):
 
     name: ClassVar[str]
     title: ClassVar[str]
-    symbols: ClassVar[Symbols] = GENERAL
-    """What results, figures and options call D and U."""
-    velocity_max: ClassVar[float] = 1.0
-    """Expected largest velocity in U, for estimates of the time step."""
     settles: ClassVar[bool] = True
     """Whether the flow may become steady or periodic; if not, averages are of the whole run, without ±."""
     picture_axis: ClassVar[str] = "z"
@@ -81,8 +68,6 @@ class Case(Driven):
     """Measures and profiles, or beginnings of their names, that only a run with some results has."""
     code: ClassVar[Any] = None
     """The Python file of the user's that it stands in, a :class:`alsph.cases.source.Source`."""
-
-    resolution: int = Field(default=20, ge=8, description="particles per reference length, D/Δx [-]")
 
     @classmethod
     def parameter_names(cls) -> list[str]:
@@ -115,13 +100,6 @@ class Case(Driven):
         return 2.0 * max(self.checked_domain.size)
 
     @property
-    def largest_time_step(self) -> float:
-        """Upper bound of the time step, which all steps have that are not adaptive [Δx/U]."""
-        if self.time_step or not self.courant:
-            return self.time_step or math.nan
-        return self.courant / (1.0 if self.adaptive_time_step else self.velocity_max)
-
-    @property
     def thickness(self) -> float:
         """Extent of the body that drag and lift are those of, across the stream [D]."""
         return 1.0
@@ -139,20 +117,6 @@ class Case(Driven):
     @abstractmethod
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return the particles at the start."""
-
-    def particle_estimate(self) -> int:
-        """Return about how many particles :meth:`particles` makes, without making them.
-
-        By default, those that fill the domain, the buffers of its inlets and outlets, and walls beyond sides that
-        nothing else closes.
-        """
-        beyond = {"inlet": self.buffer_columns, "outlet": self.buffer_columns, "none": self.support_layers}
-        domain = self.checked_domain
-        columns = [
-            length / self.particle_spacing + sum(beyond.get(side, 0) for side in sides)
-            for length, sides in zip(domain.size, domain.boundaries, strict=True)
-        ]
-        return round(math.prod(columns))
 
     @property
     def is_averaged(self) -> bool:
@@ -247,34 +211,6 @@ class Case(Driven):
         """Return the curves of a run of this case that have a reference."""
         return []
 
-    @property
-    def particle_spacing(self) -> float:
-        """Particle spacing Δx [D]."""
-        return 1.0 / self.resolution
-
-    def settings(self) -> dict[str, Any]:
-        """Return the engine's settings (see docs/architecture.md)."""
-        return self.method_settings() | {
-            "dimensions": self.space_dimensions,
-            "velocity_limit": VELOCITY_LIMIT,
-            "particle_spacing": self.particle_spacing,
-            "density": 1.0,
-            "kinematic_viscosity": self.kinematic_viscosity,
-            "body_force": self.body_force(),
-            "time_step": self.largest_time_step * self.particle_spacing,
-            "domain": self.checked_domain.settings(),
-            "bodies": [body.settings() | self._ruled(body) for body in self.checked_bodies],
-        }
-
-    def _ruled(self, body: SolidBody) -> dict[str, Any]:
-        """Return what is to be changed in the settings of a body that a rule tells of."""
-        if "motion" in self.rules and body.name in self.moved_bodies:
-            return {"velocity": None, "moves": True}
-        if body.moves and body.velocity is None and not body.rigid:
-            told = "give it a velocity, make it rigid, or say how it moves by `motion` or `body_motion`"
-            raise ConfigError(f"{self.name}: body '{body.name}' moves, and nothing says how; {told}")
-        return {"velocity": None} if "sliding" in self.rules and not body.moves else {}
-
     def build(self, threads: int | None = None) -> Problem:
         """Return the problem that the engine starts from.
 
@@ -306,16 +242,6 @@ class Case(Driven):
                 told = f"velocities that particles() gives to those of '{body['name']}' are not used"
                 why = f"bodies() says velocity = {body['velocity']}; say None there to keep them"
                 warnings.warn(f"{type(self).__name__}: the {told}, as {why}", stacklevel=3)
-
-    def check_memory(self, threads: int | None = None) -> None:
-        """Refuse what would not fit into the memory that is free, as :meth:`build` does."""
-        try:
-            particles, memory = self.particle_estimate(), self.memory()
-            check(f"resolution = {self.resolution}", particles, memory / max(particles, 1), threads)
-        except OverflowError:
-            raise ConfigError(
-                f"{self.name}: more particles than can be counted; lower the resolution or the size"
-            ) from None
 
     def problem(self, state: dict[str, Any]) -> Problem:
         """Return this case with the given state, for instance one from a checkpoint."""
@@ -422,73 +348,3 @@ class Case(Driven):
 
         control = Control(progress, walltime=walltime, retry=retry)
         return run(self, Path(folder), control, force=force, until=until, threads=threads, **settings)
-
-    def memory(self) -> float:
-        """Return the estimated peak memory of a simulation [bytes]."""
-        return bytes_per_particle(self.settings()) * self.particle_estimate()
-
-    def time_step_limits(self) -> dict[str, float]:
-        """Return the bounds of ΔtU/Δx at the expected largest velocity; those that do not apply are infinite.
-
-        ``courant`` is the one asked for, ``penalty``, ``acoustic``, ``viscous`` and ``body_force`` are limits of
-        stability.
-        """
-        limits = time_step_limits(self.settings(), self.velocity_max)
-        names = ("courant", "penalty", "acoustic", "viscous", "body_force")
-        return {name: limits[name] / self.particle_spacing for name in names}
-
-    def expected_time_step(self) -> float:
-        """Return the time step at the expected largest velocity [Δx/U]."""
-        if not self.adaptive_time_step:
-            return self.largest_time_step
-        limits = self.time_step_limits()
-        limits["penalty"] *= self.time_step_safety
-        return min(self.largest_time_step, *limits.values())
-
-    def expected_penalty_constant(self) -> float:
-        """Return C_BV = (c/u_max)² at the expected largest velocity, c the speed of sound of penalty or scheme.
-
-        It is infinite with a Poisson equation for the pressure.
-        """
-        if self.is_projection:
-            return math.inf
-        if self.scheme == "explicit_isph":
-            share = self.expected_time_step() / self.time_step_limits()["acoustic"]
-            return float((share * self.settings()["scheme"]["mach_number"]) ** -2)
-        if self.is_weakly_compressible:
-            return float((self.settings()["scheme"]["sound_speed"] / self.velocity_max) ** 2)
-        if self.penalty_constant is not None:
-            return self.penalty_constant
-        largest = time_step_limits(self.settings(), self.velocity_max)["lambda_max"]
-        return (self.expected_time_step() * self.velocity_max) ** -2 / largest
-
-    def time_step_warning(self) -> str | None:
-        """Return a warning if steps are to be taken above the stability law, which it names."""
-        limits = self.time_step_limits()
-        binding = min(limits, key=lambda name: limits[name])
-        step = self.largest_time_step
-        if step <= limits[binding] or (self.adaptive_time_step and self.adaptive_until is None):
-            return None
-        law = "courant limit" if binding == "courant" else f"{binding.replace('_', ' ')} stability limit"
-        return self.symbols(
-            f"time_step = {step:.4g} lies above the {law} "
-            f"{limits[binding]:.4g} (ΔtU/Δx at u_max = {self.velocity_max:g} U); "
-            "expect divergence: lower time_step or switch adaptive_time_step on"
-        )
-
-    def whole_cells(self, name: str, length: float) -> int:
-        """Return how many particle spacings a `length` [D] is; it must be a whole number of them.
-
-        Raises
-        ------
-        ValueError
-            If it is not, with the lengths next to it that are.
-        """
-        cells = length * self.resolution
-        if abs(cells - round(cells)) > 1e-6:
-            near = [f"{count / self.resolution:.6g}" for count in (np.floor(cells), np.ceil(cells)) if count > 0]
-            raise ValueError(
-                f"{name} = {length:g}: not a whole number of particle spacings (1/{self.resolution}); "
-                f"use {' or '.join(near)}"
-            )
-        return round(cells)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
 from alsph.cases.method import Method
 from alsph.errors import ConfigError
+from alsph.symbols import GENERAL, Symbols
 from alsph.units import Units
 
 ROUNDING = 1e-6
@@ -17,6 +18,9 @@ ROUNDING = 1e-6
 
 class Dimensional(Method):
     """The part of :class:`alsph.cases.Case` that ties it to the world: all else is in D, U and ρ."""
+
+    symbols: ClassVar[Symbols] = GENERAL
+    """What results, figures and options call D and U."""
 
     reynolds: float = Field(default=100.0, gt=0, description="Reynolds number UD/ν [-]")
     units: Units | None = Field(
