@@ -65,9 +65,11 @@ def test_normal_leads_to_the_surface(shape):
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_symmetric_body_has_symmetric_particles(name):
-    solid = thin.solid(thin.carried(SHAPES[name], SPACING), SPACING, 4)
-    mirror = np.array([1.0, -1.0])
-    assert same(solid.position + SPACING * solid.normal, (solid.position + SPACING * solid.normal) * mirror)
+    carried = [(thin.carried(SHAPES[name], 1 / count), 1 / count) for count in range(8, 41)]
+    for shape, spacing in [each for each in carried if not each[0].is_empty]:
+        solid = thin.solid(shape, spacing, 4)
+        states = np.concatenate([solid.position, solid.normal, solid.depth[:, None]], axis=1)
+        assert same(states, states * (1, -1, 1, -1, 1)), spacing
 
 
 def test_square_has_the_particles_of_the_lattice():

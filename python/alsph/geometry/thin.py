@@ -128,6 +128,7 @@ def solid(shape: Polygon | MultiPolygon, spacing: float, layers: int) -> Solid:
     half.normal[len(upper) :, 1] = 0
     half = with_both_faces(_with_normals(half, shape), shape, layers * spacing)
     flip, above = np.array([1.0, -1.0]), half.position[:, 1] > 0
+    half.normal[~above] = np.sign(half.normal[~above] * [1, 0])  # of two faces that are as near, the mean
     return Solid(
         np.concatenate([half.position, half.position[above] * flip]),
         np.concatenate([half.normal, half.normal[above] * flip]),
