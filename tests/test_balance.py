@@ -16,7 +16,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
         ("square_cylinder", {"resolution": 10}, 1.0, 2.5, 0.03),
         ("ellipse_0.4", {"resolution": 12, "angle_of_attack": 15.0}, 0.8, 1.6, 0.03),
         ("plate_0.3", {"resolution": 10}, 0.5, 1.25, 0.03),
-        ("wedge_0.4", {"resolution": 10}, 0.8, 1.6, 0.06),
+        ("wedge_0.4", {"resolution": 12}, 0.8, 1.6, 0.05),
         ("naca0012", {"resolution": 20, "angle_of_attack": 10.0, "reynolds": 500.0}, 0.4, 0.8, 0.08),
     ],
 )

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from alsph import Run, plotting
 from alsph.analysis.loads import PressureCoefficient
-from alsph.cases import Body, Cavity, Cylinder, CylinderPair
+from alsph.cases import CASES, Body, Cavity, Cylinder, CylinderPair
 from alsph.config import Config
 from alsph.errors import ConfigError
 from alsph.folder.run_folder import RunFolder
-from alsph.geometry.particles import Snapshot
+from alsph.geometry.domain import Domain
+from alsph.geometry.particles import Kind, Snapshot
 from alsph.plotting.pictures import _limit
 from alsph.plotting.style import line
 from alsph.study.results import names
@@ -259,3 +260,62 @@ def test_colours_of_fields_rise_evenly_and_those_of_signed_ones_from_the_middle(
         assert lightness.argmax() == 50 and lightness[50] > 95
         lightness = np.concatenate([lightness[:51], 200 - lightness[51:]])
     assert np.diff(lightness).min() > -0.2
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_bodies_that_a_case_tells_of_are_where_its_particles_are(name):
+    case = CASES[name](resolution=10)
+    state = case.particles()
+    height, solid = case.solid_height(state["position"]), state["kind"] == Kind.SOLID
+    if height is None:
+        pytest.skip("the particles themselves are drawn")
+    assert height[~solid].min() > -1e-9 and height[solid].max() < 1e-9
+    assert height[solid].max() > -0.8 * case.particle_spacing  # the first layer is right under the surface
+
+
+def drawn(figure):
+    """Return the vertices (n, 2) of what a picture shows as solid."""
+    return np.concatenate(
+        [np.empty((0, 2)), *(path.vertices for each in figure.axes[0].collections for path in each.get_paths())]
+    )
+
+
+def test_a_picture_has_the_corners_of_a_body_and_none_in_those_of_a_box(tmp_path):
+    def still(position, time):
+        return np.zeros_like(position)
+
+    square = Body(shape="square_cylinder", resolution=10, length=6, height=5, upstream=2)
+    flow = write_flow(tmp_path / "square", square, still)
+    shown = drawn(flow.plot_field("velocity"))
+    corners = np.array([[1.5, -0.5], [2.5, -0.5], [1.5, 0.5], [2.5, 0.5]])
+    assert np.hypot(*(shown[:, None] - corners).T).min(axis=1) == pytest.approx(0, abs=0.03)
+    assert len(drawn(write_flow(tmp_path / "box", Cavity(resolution=10), still).plot_field("velocity"))) == 0
+
+
+def test_a_body_that_has_moved_is_drawn_where_its_particles_are(tmp_path):
+    cylinder = Cylinder(resolution=10, length=8, height=8)
+    snapshot = write_flow(tmp_path / "run", cylinder, lambda position, time: 0 * position).snapshot()
+    solid = ~snapshot.fluid
+    gone = ~solid & (np.hypot(*(snapshot.position - [4.5, 0.0]).T) < 0.5)
+    moved = {name: getattr(snapshot, name)[~gone] for name in ("velocity", "pressure", "velocity_divergence")}
+    moved |= {"vorticity": snapshot.vorticity[~gone], "kind": snapshot.kind[~gone]}
+    position = (snapshot.position + np.where(solid, 0.5, 0.0)[:, None] * [1, 0])[~gone]
+    shown = drawn(plotting.field(replace(snapshot, position=position, **moved), "velocity", 0.1))
+    radius = np.hypot(*(shown - [4.5, 0.0]).T)
+    assert np.median(radius) == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_picture_goes_on_across_periodic_sides():
+    position = np.stack(np.meshgrid(np.arange(0.05, 1, 0.1), np.arange(0.05, 1, 0.1)), axis=-1).reshape(-1, 2)
+    wave, n = np.sin(2 * np.pi * position[:, 0]), len(position)
+    box = Domain((0, 0), (1, 1), [("periodic", "periodic")] * 2)
+    flow = Snapshot(0.0, position, np.zeros((n, 2)), wave, *np.zeros((2, n)), np.zeros(n, np.uint8))
+    view, x = (0.0, 1.0, 0.0, 1.0), (np.arange(20) + 0.5) / 20
+
+    def row(domain):
+        image = plotting.field(replace(flow, domain=domain), "pressure", 0.1, view=view).axes[0].images[0]
+        return np.ma.filled(image.get_array(), np.nan)[10]
+
+    inside = row(box)
+    assert inside == pytest.approx(inside[5] * np.sin(2 * np.pi * x) / np.sin(2 * np.pi * x[5]), abs=0.03)
+    assert abs(row(None) - inside)[0] > 0.03

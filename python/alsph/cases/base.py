@@ -128,6 +128,13 @@ class Case(Discretised):
         """Whether there is water that lies on a floor, for gauges to tell its depth."""
         return False
 
+    def solid_height(self, position: FloatArray) -> FloatArray | None:
+        """Return how far points (m, d) lie outside of bodies and walls at the start (m,), negative inside [D].
+
+        Pictures draw them by it. Far from all it may be infinite; None, the default, draws what solid particles fill.
+        """
+        return None
+
     def surface_points(self) -> Surface | None:
         """Return where the surface pressure is sampled."""
         return None

@@ -19,7 +19,7 @@ from alsph.cases.channel import Channel
 from alsph.errors import ConfigError
 from alsph.geometry.lattice import inside
 from alsph.geometry.outline import Outline
-from alsph.geometry.packing import pack_around
+from alsph.geometry.packing import Planar, height_over, pack_around
 from alsph.geometry.solids import Solid
 from alsph.geometry.surface import Surface, along
 from alsph.geometry.thin import carried, pockets, solids
@@ -116,6 +116,11 @@ class Bodies(Channel):
         position = np.concatenate([solid.position for solid in self._solids])
         bodies = shapely.union_all(self.carried)
         return np.asarray(self.centre + pack_around(cells - self.centre, bodies, position, self.particle_spacing))
+
+    def solid_height(self, position: FloatArray) -> FloatArray:
+        """Return how far points (n, 2) lie outside of the bodies as carried [D]."""
+        bodies = Planar(shapely.union_all(self._sampled))
+        return height_over(bodies, position - self.centre, self.particle_spacing)
 
     def _initial_velocity(self, position: FloatArray) -> FloatArray:
         """Return the velocity (n, 2) at the start: none in holes."""

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
+from alsph.arrays import FloatArray
 from alsph.cases.base import Case
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.particles import Kind, join, particles
@@ -96,6 +97,11 @@ class ConcentricRelease(Case):
         solid = np.concatenate([inner.position, outer.position])
         fluid = ring_of_fluid(RADIUS, self.vessel / 2, self.resolution, solid)
         return join(particles(Kind.FLUID, fluid, 0.0), inner.particles(), outer.particles(body=1))
+
+    def solid_height(self, position: FloatArray) -> FloatArray:
+        """Return how far points (n, 2) lie between cylinder and vessel at the start [D]."""
+        radius = np.hypot(*position.T)
+        return np.asarray(np.minimum(radius - RADIUS, self.vessel / 2 - radius))
 
     @property
     def added_mass_coefficient(self) -> float:

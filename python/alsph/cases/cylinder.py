@@ -52,6 +52,10 @@ class Cylinder(Channel):
         """Return the cells whose centres are at least a radius from that of the cylinder."""
         return np.asarray(cells[np.hypot(*(cells - self.centre).T) >= RADIUS])
 
+    def solid_height(self, position: FloatArray) -> FloatArray:
+        """Return how far points (n, 2) lie outside of the cylinder [D]."""
+        return np.asarray(np.hypot(*(position - self.centre).T) - RADIUS)
+
     def surface_points(self) -> Surface:
         """Return 72 points on the cylinder, every 5 degrees from the front stagnation point over the upper side."""
         return circle(RADIUS, 72).moved(self.centre)

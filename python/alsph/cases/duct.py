@@ -14,6 +14,7 @@ from alsph.arrays import FloatArray
 from alsph.cases.base import Case
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cells, inside
+from alsph.geometry.packing import Planar
 from alsph.geometry.particles import Kind, join, particles
 from alsph.geometry.solids import walls
 
@@ -80,6 +81,10 @@ class Duct(Case):
             *(particles(kind, points[chosen], self.developed(points[chosen])) for kind, chosen in groups.items()),
             solid.particles(body=self.wall(solid.position)),
         )
+
+    def solid_height(self, position: FloatArray) -> FloatArray:
+        """Return how far points (n, 2) lie in the channel [D]."""
+        return -Planar(self.channel(self._end)).height(position)
 
     def wall(self, position: FloatArray) -> ArrayLike:
         """Return which of :meth:`bodies` the solid particles at positions (n, 2) belong to, by its place there."""

@@ -17,7 +17,7 @@ from alsph.cases import remarks
 from alsph.cases.channel import Channel
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain
-from alsph.geometry.packing import pack
+from alsph.geometry.packing import height_over, pack
 from alsph.geometry.solids import Solid
 from alsph.geometry.volume import Volume
 
@@ -119,6 +119,10 @@ class Spatial(Channel):
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces on the body and the Strouhal number; of a quarter the drag alone."""
         return [measure for measure in super().measures(run) if "drag" in measure.name or not self.quarter]
+
+    def solid_height(self, position: FloatArray) -> FloatArray:
+        """Return how far points (n, 3) lie outside of the body [D]."""
+        return height_over(self._volume, position - self.centre, self.particle_spacing)
 
     def solids(self) -> list[Solid]:
         """Return layers that follow the surface."""

@@ -79,6 +79,11 @@ class TaylorCouette(Case):
             outer.particles(self.outer_velocity * _around(outer.position), body=1),
         )
 
+    def solid_height(self, position: FloatArray) -> FloatArray:
+        """Return how far points (n, 2) lie in the gap [D]."""
+        radius = np.hypot(*position.T)
+        return np.asarray(np.minimum(radius - self.inner_radius, self.outer_radius - radius))
+
     @property
     def steady(self) -> tuple[float, float]:
         """A and B of the steady velocity Ar + B/r [U/D, UD]."""

@@ -17,7 +17,6 @@ from alsph.analysis.probes import Probes
 from alsph.arrays import FloatArray
 from alsph.errors import RunFolderError
 from alsph.folder.durable import viewing
-from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Snapshot
 from alsph.geometry.surface import Surface
 from alsph.memory import free_memory
@@ -291,8 +290,8 @@ def snapshot_times(path: Path) -> FloatArray:
         return np.asarray(times, float)
 
 
-def snapshot(path: Path, step: int, domain: Domain | None = None) -> Snapshot:
-    """Read one snapshot of ``particles.vtkhdf``, of a flow in a domain."""
+def snapshot(path: Path, step: int) -> Snapshot:
+    """Read one snapshot of ``particles.vtkhdf``."""
     with _opened(path) as file:
         root = file["VTKHDF"]
         part = int(sound(root, "Steps/PartOffsets")[step])
@@ -304,6 +303,12 @@ def snapshot(path: Path, step: int, domain: Domain | None = None) -> Snapshot:
             raise ValueError(f"snapshot {step} is incomplete")
         time = float(sound(root, "Steps/Values")[step])
     dimensions = 3 if fields["vorticity"].ndim == 2 else 2
-    kind = fields.pop("kind").astype(np.uint8)
-    velocity = fields.pop("velocity")[:, :dimensions]
-    return Snapshot(time=time, position=position[:, :dimensions], velocity=velocity, kind=kind, domain=domain, **fields)
+    return Snapshot(
+        time=time,
+        position=position[:, :dimensions],
+        velocity=fields["velocity"][:, :dimensions],
+        pressure=fields["pressure"],
+        velocity_divergence=fields["velocity_divergence"],
+        vorticity=fields["vorticity"],
+        kind=fields["kind"].astype(np.uint8),
+    )

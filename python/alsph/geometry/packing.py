@@ -152,7 +152,7 @@ def pack(cells: FloatArray, body: Region, solid: FloatArray, spacing: float) -> 
         Particle spacing Δx.
     """
     count = round(len(cells) - body.volume / spacing ** cells.shape[1])
-    height = _height(body, cells, BAND * spacing)
+    height = height_over(body, cells, BAND * spacing)
     far, near = cells[height > BAND * spacing], cells[(height <= BAND * spacing) & (height > -spacing)]
     sides = _around(_beyond(cells, spacing), body, 2 * BAND * spacing)
     fixed = np.concatenate([_around(far, body, 3 * BAND * spacing), sides, solid])
@@ -164,7 +164,7 @@ def pack(cells: FloatArray, body: Region, solid: FloatArray, spacing: float) -> 
     return np.asarray(np.concatenate([far, spread(near, fixed, spacing, cleared, body.flips)]))
 
 
-def _height(body: Region, points: FloatArray, reach: float = np.inf) -> FloatArray:
+def height_over(body: Region, points: FloatArray, reach: float = np.inf) -> FloatArray:
     """Return how far points (n, d) lie outside the body, negative inside; infinite beyond `reach` of its bounds."""
     lower, upper = body.corners
     near = ((points >= lower - reach) & (points <= upper + reach)).all(axis=1)
@@ -174,7 +174,7 @@ def _height(body: Region, points: FloatArray, reach: float = np.inf) -> FloatArr
 
 
 def _around(points: FloatArray, body: Region, reach: float) -> FloatArray:
-    return np.asarray(points[_height(body, points, reach) < reach])
+    return np.asarray(points[height_over(body, points, reach) < reach])
 
 
 def _beyond(cells: FloatArray, spacing: float) -> FloatArray:
@@ -270,7 +270,7 @@ def spread(
 
 def _cleared(points: FloatArray, body: Region, least: float) -> FloatArray:
     """Move points that are nearer than `least` to the body out to that distance."""
-    height = _height(body, points, least)
+    height = height_over(body, points, least)
     low = np.flatnonzero(height < least)
     feet = body.feet(points[low])
     points = points.copy()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Literal
@@ -46,6 +47,8 @@ class Snapshot:
         See :class:`alsph.geometry.particles.Kind`.
     domain : Domain, optional
         The box that the flow is computed in, if it is known, with the sides that are periodic.
+    solid : callable, optional
+        :meth:`alsph.cases.Case.solid_height` of the case, if it is known.
     """
 
     time: float
@@ -56,6 +59,7 @@ class Snapshot:
     vorticity: FloatArray
     kind: NDArray[np.uint8]
     domain: Domain | None = None
+    solid: Callable[[FloatArray], FloatArray | None] | None = None
 
     @property
     def fluid(self) -> NDArray[np.bool_]:

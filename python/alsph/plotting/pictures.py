@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 
 PIXELS_PER_SPACING = 2
 
+FINE = 4  # pixels per spacing of bodies whose outline is known
+
+SURFACE = 0.25  # how far under a surface fluid, and above it solid particles may be [Δx]
+
 DENSITY = 1.5  # of streamlines: 45 along each side at most
 
 TALLEST = 1.5  # height over width, beyond which the picture is made narrower than its figure
@@ -170,10 +174,12 @@ def _draw_field(
     picture, body, inside = _raster(snapshot, name, spacing, extent, plane)
     limit = limit or _limit(picture[inside])
     lowest = -limit if style.signed else 0.0
-    frame: dict[str, Any] = {"extent": extent, "origin": "lower"}
-    image = axes.imshow(picture, cmap=style.colours, vmin=lowest, vmax=limit, interpolation="bilinear", **frame)
+    scale: dict[str, Any] = {"cmap": style.colours, "vmin": lowest, "vmax": limit}
+    image = axes.imshow(picture, extent=extent, origin="lower", interpolation="bilinear", **scale)
     if body.any():
-        axes.contourf(body, levels=[0.5, np.inf], colors=["0.35"], **frame)
+        sides = zip(body.shape[::-1], np.reshape(extent, (2, 2)), strict=True)
+        x, y = (np.concatenate([[low], _centres(count, low, high), [high]]) for count, (low, high) in sides)
+        axes.contourf(x, y, np.pad(body, 1, mode="edge"), levels=[0.5, np.inf], colors=["0.35"])
     label = style.label + (", less its mean" if name == "pressure" and _is_closed(snapshot) else "")
     above = name == "pressure" and meets_air(snapshot) and not np.nanmin(picture, initial=0.0) < 0
     ends = "both" if style.signed and not above else "max"
@@ -258,31 +264,70 @@ def _raster(
     The field is NaN where there is none. Of a fluid with a free surface, gradients at it and in spray, where half the
     neighbours are missing, make no scale.
     """
-    left, right, bottom, top = extent
-    columns, rows = (max(2, round(PIXELS_PER_SPACING * length / spacing)) for length in (right - left, top - bottom))
-    x = left + (np.arange(columns) + 0.5) * (right - left) / columns
-    y = bottom + (np.arange(rows) + 0.5) * (top - bottom) / rows
-    points = np.stack([grid.ravel() for grid in np.meshgrid(x, y)], axis=1)
     whole = snapshot
+    points, shape = _pixels(extent, spacing / PIXELS_PER_SPACING)
     if plane is not None:
         points, snapshot = plane.points(points), plane.near(snapshot, spacing)
-    fluid, values = snapshot.fluid, _values(snapshot, name, whole, spacing)
-    picture = sampling.average(snapshot.position[fluid], values, points, spacing).reshape(rows, columns)
+    fluid, values = snapshot.position[snapshot.fluid], _values(snapshot, name, whole, spacing)
+    if whole.domain is not None:
+        fluid, values = sampling.with_images(fluid, values, whole.domain, sampling.REACH * spacing)
+    picture = sampling.average(fluid, values, points, spacing).reshape(shape)
     scaled = np.isfinite(picture)
     if meets_air(whole):
-        full = sampling.fill(snapshot.position[fluid], points, spacing).reshape(rows, columns) > INSIDE
+        full = sampling.fill(fluid, points, spacing).reshape(shape) > INSIDE
         scaled = scaled & full if (scaled & full).any() else scaled
-    if fluid.all():
-        return picture, np.zeros_like(picture), scaled
-    body = sampling.fill(snapshot.position[~fluid], points, spacing)
+    body = _outlined(snapshot, spacing, extent, plane)
+    return picture, _filled(snapshot, spacing, points, picture, plane) if body is None else body, scaled
+
+
+def _pixels(extent: tuple[float, float, float, float], size: float) -> tuple[FloatArray, tuple[int, int]]:
+    """Return the centres (m, 2) of pixels of about that size, row by row, and the numbers of rows and columns."""
+    left, right, bottom, top = extent
+    columns, rows = (max(2, round(length / size)) for length in (right - left, top - bottom))
+    x, y = _centres(columns, left, right), _centres(rows, bottom, top)
+    return np.stack([grid.ravel() for grid in np.meshgrid(x, y)], axis=1), (rows, columns)
+
+
+def _centres(count: int, low: float, high: float) -> FloatArray:
+    """Return the centres of as many pixels between two edges."""
+    return np.asarray(low + (np.arange(count) + 0.5) * (high - low) / count)
+
+
+def _outlined(
+    snapshot: Snapshot, spacing: float, extent: tuple[float, float, float, float], plane: Plane | None
+) -> FloatArray | None:
+    """Return the share of each fine pixel that is solid by what the case says of its bodies and walls.
+
+    None if it says nothing, or the particles are not where that says, such as those of a body that has moved.
+    """
+    if snapshot.solid is None or snapshot.fluid.all():
+        return None
+    height = snapshot.solid(snapshot.position)
+    if height is None or (np.where(snapshot.fluid, -height, height) > SURFACE * spacing).any():
+        return None
+    points, shape = _pixels(extent, spacing / FINE)
+    height = snapshot.solid(points if plane is None else plane.points(points))
+    return None if height is None else np.clip(0.5 - height / spacing, 0, 1).reshape(shape)
+
+
+def _filled(
+    snapshot: Snapshot, spacing: float, points: FloatArray, picture: FloatArray, plane: Plane | None
+) -> FloatArray:
+    """Return the share of each pixel that solid particles fill, those beyond closed sides left out."""
+    solid = snapshot.position[~snapshot.fluid]
+    if snapshot.domain is not None:
+        solid = solid[snapshot.domain.beyond("none", solid) <= 0]
+    if not len(solid):
+        return np.zeros_like(picture)
+    body = sampling.fill(solid, points, spacing)
     if plane is not None:  # which may be one that the flow is computed on one side of
-        least = 0.3 if meets_air(whole) else 0.1  # a body in the air ends near its own surface
-        body = body / np.maximum(body + sampling.fill(snapshot.position[fluid], points, spacing), least)
-    body = body.reshape(rows, columns)
+        least = 0.3 if meets_air(snapshot) else 0.1  # a body in the air ends near its own surface
+        body = body / np.maximum(body + sampling.fill(snapshot.position[snapshot.fluid], points, spacing), least)
+    body = body.reshape(picture.shape)
     from scipy.ndimage import binary_fill_holes
 
     hollow = binary_fill_holes(body > 0.5) & np.isnan(picture)
-    return picture, np.where(hollow, 1.0, body), scaled
+    return np.where(hollow, 1.0, body)
 
 
 def _limit(values: FloatArray) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -81,10 +82,11 @@ class Fields:
         if len(self.times) == 0:
             raise RunFolderError(f"{self.path}: no snapshot yet; wait for the first one or lower output_interval")
         index = len(self.times) - 1 if time is None else int(np.abs(self.times - time).argmin())
-        domain = None
+        found = reading.snapshot(self.path / "particles.vtkhdf", index)
         with suppress(RunFolderError):  # of a case that is not known the particles can be read all the same
-            domain = self.config.case.checked_domain
-        return reading.snapshot(self.path / "particles.vtkhdf", index, domain)
+            case = self.config.case
+            return replace(found, domain=case.checked_domain, solid=case.solid_height)
+        return found
 
     @cached_property
     def probes(self) -> Probes:
