@@ -85,6 +85,20 @@ def test_forces_show_the_window_and_ignore_the_impulsive_start(run):
     assert window[0].get_x() == pytest.approx(run.window.start)
 
 
+def test_references_are_drawn_where_they_are_known(run, tmp_path):
+    assert not [line for axes in run.plot_forces().axes for line in axes.lines if line.get_linestyle() == ":"]
+    run = Run(write_run(tmp_path / "run", Cylinder(resolution=8), end=20.0))
+    known = {measure.name: measure.reference for measure in run.measures}
+    levels = [
+        [line.get_ydata()[0] for line in axes.lines if line.get_linestyle() == ":"] for axes in run.plot_forces().axes
+    ]
+    amplitude = known["lift coefficient amplitude"]
+    assert levels == [[known["mean drag coefficient"]], [amplitude, -amplitude]]
+    (line,) = [line for line in run.plot_spectrum().axes[1].lines if line.get_linestyle() == ":"]
+    assert line.get_xdata()[0] == known["Strouhal number"]
+    assert not [line for axes in run.plot_forces(body="cylinder").axes for line in axes.lines if line.get_ls() == ":"]
+
+
 def test_spectra_of_the_forces_in_the_window(run, tmp_path):
     drag, lift = run.plot_spectrum(tmp_path / "spectrum.png").axes
     (line,) = lift.lines

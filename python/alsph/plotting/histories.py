@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,22 +17,34 @@ from alsph.results.ledger import Ledger
 from alsph.results.outcome import has_moved, has_surface
 from alsph.results.run import Run
 
+REFERENCE: dict[str, Any] = {"color": "k", "ls": ":", "lw": 1}
+"""How levels of a reference are drawn."""
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
 def forces(run: Run, body: str | None = None) -> Figure:
-    """Drag and lift coefficients over time with their parts, the averaging window shaded and the means drawn."""
+    """Drag and lift coefficients over time with their parts, the averaging window shaded and the means drawn.
+
+    Where a reference has them, for all bodies together, dots are at its mean drag and the amplitude of its lift.
+    """
     figure = blank(9, 6)
     upper, lower = figure.subplots(2, 1, sharex=True)
-    time = run.history["time"]
+    time, known = run.history["time"], {} if body else references(run)
+    levels = {
+        "x": [known[name] for name in ("mean drag coefficient",) if name in known],
+        "y": [sign * known[name] for name in ("lift coefficient amplitude",) if name in known for sign in (1, -1)],
+    }
     for axes, axis, symbol in ((upper, "x", "C_D"), (lower, "y", "C_L")):
         parts = {part: run.coefficient(axis, part, body) for part in ("viscous", "pressure", "total")}
         for number, (part, values) in zip((2, 1, 0), parts.items(), strict=True):
             axes.plot(time, values, lw=1, label=part, **line(number, 3, len(time)))
         if limits := robust_limits([(time, values) for values in parts.values()]):
-            axes.set_ylim(limits)
+            axes.set_ylim(min([limits[0], *levels[axis]]), max([limits[1], *levels[axis]]))
+        for number, level in enumerate(levels[axis]):
+            axes.axhline(level, **REFERENCE, label="" if number else "reference")
         axes.set_ylabel(f"${symbol}$")
         _finish(axes, run.window, legend=axes is upper)
     if run.window.edges.size and run.bodies:
@@ -48,6 +60,11 @@ def forces(run: Run, body: str | None = None) -> Figure:
         lower.set_title(f"of {Fraction(share)} of the body, which is computed", loc="right", fontsize="medium")
     lower.set_xlabel(TIME_LABEL)
     return figure
+
+
+def references(run: Run) -> dict[str, float]:
+    """Return what the case of a run has references of, by the names of its measures."""
+    return {measure.name: measure.reference for measure in run.measures if np.isfinite(measure.reference)}
 
 
 def coefficients(runs: dict[str, Run]) -> Figure:
@@ -94,6 +111,8 @@ def spectrum(runs: dict[str, Run], body: str | None = None) -> Figure:
     """
     figure = blank(9, 6)
     grid = figure.subplots(2, 1, sharex=True)
+    known = map(references, runs.values())
+    strouhal = {values["Strouhal number"] for values in known if "Strouhal number" in values}
     for axes, axis, symbol in zip(grid, "xy", ("C_D", "C_L"), strict=True):
         for number, (name, run) in enumerate(runs.items()):
             time, window, coefficient = run.history["time"], run.window, run.coefficient(axis, body=body)
@@ -104,6 +123,8 @@ def spectrum(runs: dict[str, Run], body: str | None = None) -> Figure:
                 axes.loglog(*(a[1:] for a in lines), lw=0.8, label=label, **drawn)
         axes.set_ylabel(f"amplitude of ${symbol}$")
         axes.grid(alpha=0.3)
+        if axis == "y" and axes.lines and len(strouhal) == 1:
+            axes.axvline(*strouhal, **REFERENCE, label="Sr of the reference")
         if axes.lines:
             axes.legend()
     grid[-1].set_xlabel("$fD/U$")
