@@ -160,6 +160,8 @@ def test_plot_in_3d_draws_what_it_can(alsph, tmp_path):
         "".join(f"{run / 'figures' / name}.png\n" for name in drawn),
     )
     assert "no fluid there" in alsph("plot", run, "--field", "pressure", "--plane", "y=2")[2]
+    code, output, error = alsph("plot", run, "--plane", "q=1")
+    assert (code, output) == (2, "") and "must be an axis" in error
 
 
 def test_describe(alsph, small_options):

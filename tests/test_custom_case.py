@@ -126,6 +126,16 @@ def test_a_case_of_anothers_is_one_of_alsphs(command, tmp_path, name, recorded):
             "my_cases.py: has no case, a class that derives",
         ),
         ("from alsph.cases import Bodies\nclass Half(Bodies): ...\n", "", "my_cases.py: Half lacks shapes"),
+        (
+            HEATED + "from alsph.cases import Bodies\nclass Half(Bodies): ...\n",
+            ":Half",
+            "my_cases.py: Half lacks shapes",
+        ),
+        (
+            "from alsph.cases import Bodies\nclass Five(Bodies):\n    def shapes(self):\n        return 5\n",
+            "",
+            "Five.shapes() must be points (n, 2)",
+        ),
         (HEATED + "class Other(Heated): ...\n", "", "has the cases Heated, Other; say which, as my_cases.py:Heated"),
         (HEATED.replace('"heated"', '"he/ated"'), "", "may hold letters, digits, _ and - only"),
         (HEATED.replace('"heated"', '"cylinder"'), "", "its name, 'cylinder', is that of a case which is there"),

@@ -314,6 +314,20 @@ def test_a_rule_that_gives_no_velocities_is_told_so_wherever_it_is_asked(small, 
             fingerprint(name, lambda position, time: None, small.domain(), 1.0)
 
 
+def test_a_rule_that_fails_is_told_with_its_line(small):
+    def inflow(position, time):
+        return [1.0, 0.0] if time == 0 else position / "2"
+
+    simulation = small.simulation(threads=1)
+    simulation.set_inflow(inflow)
+    line = inflow.__code__.co_firstlineno + 1
+    told = rf"inflow: the function failed at t\* = 0\.\d+: .*test_restart.py: line {line}:"
+    with pytest.raises(ConfigError, match=told):
+        simulation.advance(3)
+    with pytest.raises(ConfigError, match=r"test_restart.py: line \d+: forcing: the function must give 2 numbers"):
+        fingerprint("forcing", lambda position, time: None, small.domain(), 1.0)
+
+
 def test_checkpoints_without_a_rule_are_as_before(tmp_path, small):
     """And those of an older alsph, which had none, go on."""
     path = small.run(tmp_path / "run", until=0.05, progress=False).path

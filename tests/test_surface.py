@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import shapely
 from alsph import Run
-from alsph.cases import Body, Cylinder
+from alsph.cases import Body, Cylinder, CylinderPair
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder.run_folder import RunFolder
@@ -76,6 +76,9 @@ def test_bodies_follow_each_other():
     surface = along(TWO)
     assert (np.diff(surface.part) >= 0).all() and set(surface.part) == {0, 1}
     assert surface.chord.max() == pytest.approx(1) and surface.chord[surface.part == 0].max() == pytest.approx(1 / 3)
+    case = CylinderPair(resolution=10)
+    ends = [np.ptp(case.surface_points().chord[case.surface_points().part == part]) for part in (0, 1)]
+    assert ends == pytest.approx([1, 1], abs=1e-3)
 
 
 def write_body(path, case, coefficient, *, geometry=True, torque=0.0):

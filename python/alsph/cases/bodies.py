@@ -45,7 +45,10 @@ class Bodies(Channel):
     @cached_property
     def outline(self) -> shapely.Polygon | shapely.MultiPolygon:
         """The body, or all bodies together."""
-        polygons = Outline.of(self.shapes()).polygons
+        try:
+            polygons = Outline.of(self.shapes()).polygons
+        except ConfigError as error:
+            raise ConfigError(f"{type(self).__name__}.shapes() {error}") from None
         return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
 
     @model_validator(mode="after")
@@ -189,9 +192,13 @@ class Bodies(Channel):
         return found
 
     def surface_points(self) -> Surface:
-        """Return the pieces of the bodies as carried, from the foremost point over the upper side and back below."""
-        left, _, right, _ = self.bounds
-        return along(self._carried_parts, 0.0, (left, right)).moved(self.centre)
+        """Return the pieces of the bodies as carried, from the foremost point over the upper side and back below.
+
+        The chord of each is its own.
+        """
+        bodies = zip(self.outlines, self._sampled, strict=True)
+        chords = [outline.bounds[::2] for outline, body in bodies for _ in shapely.get_parts(body)]
+        return along(self._carried_parts, 0.0, chords).moved(self.centre)
 
     @property
     def surface_bodies(self) -> list[str]:

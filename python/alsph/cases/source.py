@@ -120,6 +120,8 @@ def _one(name: str | None, file: str, text: str) -> type[Case]:
     if name is None and len(usable) > 1:
         raise ConfigError(f"{file}: has the cases {', '.join(usable)}; say which, as {file}:{next(iter(usable))}")
     name = name or next(iter(usable))
+    if name in found.keys() - usable.keys():
+        raise ConfigError(f"{file}: {name} lacks {', '.join(sorted(found[name].__abstractmethods__))}")
     if name not in usable:
         raise ConfigError(f"{file}: has no case '{name}'; {suggest(name, usable)}")
     return usable[name]

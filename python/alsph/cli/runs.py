@@ -164,6 +164,8 @@ def _plot(
     names: list[Any] = field or ["vorticity", "pressure"]
     for name in names:
         alsph.plotting.field_style(name)
+    if plane is not None:
+        run.plane(run.snapshot(time), plane)  # refused before anything is drawn
     figures = output or path / "figures"
     drawings = _drawings(run, body or []) | {
         name: functools.partial(run.plot_field, name, time, plane=plane, streamlines=streamlines) for name in names

@@ -6,6 +6,7 @@ bodies have come [D] and turned [rad], whose centres at the start are the positi
 """
 
 import hashlib
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Self
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alsph.arrays import FloatArray
-from alsph.errors import ConfigError
+from alsph.errors import AlsphError, ConfigError
 from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import lattice
 
@@ -78,9 +79,16 @@ def asked(name: str, rule: Rule, position: FloatArray, time: float) -> FloatArra
     Raises
     ------
     ConfigError
-        If they are none.
+        If they are none, or the rule fails; the message says where it stands.
     """
-    values = rule(position.copy(), time)
+    try:
+        values = rule(position.copy(), time)
+    except AlsphError:
+        raise
+    except Exception as error:
+        *_, frame = traceback.extract_tb(error.__traceback__)
+        told = f"{frame.filename}: line {frame.lineno}: {type(error).__name__}: {error}"
+        raise ConfigError(f"{name}: the function failed at t* = {time:.6g}: {told}") from error
     if values is None and name == "inflow":
         return None
     try:
@@ -94,7 +102,9 @@ def asked(name: str, rule: Rule, position: FloatArray, time: float) -> FloatArra
         position.shape[:1],
     }:
         told = " or ".join(map(str, numbers))
-        raise ConfigError(f"{name}: the function must give {told} numbers a position, or as many")
+        code = getattr(rule, "__code__", None)
+        where = f"{code.co_filename}: line {code.co_firstlineno}: " if code else ""
+        raise ConfigError(f"{where}{name}: the function must give {told} numbers a position, or as many")
     return np.broadcast_to(vectors, (len(position), vectors.shape[-1]))
 
 

@@ -19,7 +19,7 @@ from alsph.arrays import FloatArray
 from alsph.engine.columns import left_out
 from alsph.engine.core import TYPES, exact, translated
 from alsph.engine.motion import answering_poses, is_rigid
-from alsph.engine.prescribed import Prescription, Rule, answering, backflow
+from alsph.engine.prescribed import Prescription, Rule, answering, asked, backflow
 from alsph.engine.problem import Problem
 from alsph.errors import ConfigError, SharedError, SolverError
 from alsph.geometry.domain import Domain
@@ -395,7 +395,7 @@ class Simulation:
         if "inflow" not in self.rules:
             return steps
         position = self.inflow_position()
-        velocity = self.rules["inflow"](position.copy(), self.time)
+        velocity = asked("inflow", self.rules["inflow"], position, self.time)
         if velocity is not None:
             self.prescribed["inflow"] = Prescription(self.time, position, self._apply(velocity, position).copy())
         return 1

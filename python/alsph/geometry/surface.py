@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import shapely
+from numpy.typing import ArrayLike
 from shapely import MultiPolygon, Polygon, affinity
 from shapely.ops import substring
 
@@ -79,7 +80,7 @@ def circle(radius: float, count: int) -> Surface:
     )
 
 
-def along(outline: Polygon | MultiPolygon, turn: float = 0.0, chord: tuple[float, float] | None = None) -> Surface:
+def along(outline: Polygon | MultiPolygon, turn: float = 0.0, chord: ArrayLike | None = None) -> Surface:
     """Return the surface of bodies: each curve's from its leading edge over the upper side and back below.
 
     The edges of an outline, divided where they are long, are the pieces.
@@ -92,16 +93,18 @@ def along(outline: Polygon | MultiPolygon, turn: float = 0.0, chord: tuple[float
         Angle between chord and abscissa [degrees]. Leading and trailing edge are where an outline begins and ends along
         the chord, in the middle of a face across it.
     chord
-        Where the chord begins and ends along itself; those of all outlines together if None.
+        Where the chord, or that of each outline, begins and ends along itself, (2,) or (k, 2); that of all together if
+        None.
     """
     upright = affinity.rotate(outline, turn, origin=(0, 0))
-    left, right = chord or upright.bounds[::2]
     pieces = [
         np.column_stack([piece, np.full(len(piece), index)])
         for index, polygon in enumerate(shapely.get_parts(upright))
         for piece in _sides(polygon)
     ]
     x, y, normal_x, normal_y, length, side, arc, part = np.concatenate(pieces).T
+    ends = np.asarray(upright.bounds[::2] if chord is None else chord, float)
+    left, right = np.broadcast_to(ends, (shapely.get_num_geometries(upright), 2))[part.astype(int)].T
     cos, sin = np.cos(np.radians(turn)), np.sin(np.radians(turn))
     turned = np.array([[cos, -sin], [sin, cos]])  # rows of points times this are turned clockwise
     position = np.stack([x, y], axis=1) @ turned
