@@ -72,6 +72,18 @@ def test_probes_are_near_the_exact_solution(vortices):
     assert found.pressure == pytest.approx(pressure, abs=0.04)
 
 
+def test_a_figure_shows_what_the_probes_recorded(vortices):
+    record = vortices.probes
+    figure = vortices.plot_probes()
+    assert [axes.get_ylabel() for axes in figure.axes] == ["$u/U$", "$v/U$", r"$p\,/\,\rho U^2$"]
+    columns = [*np.moveaxis(record.velocity, 2, 0), record.pressure]
+    for axes, values in zip(figure.axes, columns, strict=True):
+        drawn = np.array([line.get_ydata() for line in axes.lines])
+        assert len(drawn) == min(10, len(record.position)) and (drawn[[0, -1]] == values.T[[0, -1]]).all()
+    places = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert places[0] == ", ".join(f"${axis}/D$ = {at:g}" for axis, at in zip("xy", record.position[0], strict=True))
+
+
 def test_snapshots_give_the_same_at_the_same_time(vortices):
     """Two ways: the engine's fit over the kernel's support, and one over the nearest particles of the snapshot."""
     time = vortices.times[-1]

@@ -100,15 +100,23 @@ class Obstacle(FreeSurface):
         water = self.fluid(position[wet], np.zeros_like(position[wet]), pressure[wet])
         return join(water, self._solid.particles(np.zeros(3)))
 
+    def _depths(self, position: FloatArray) -> FloatArray:
+        """Return how far points (n, 3) lie behind each face of the box (4, n) [H]; a lid of the tank is none."""
+        (left, _, _), (right, side, top) = self.box
+        x, y, z = position.T
+        above = np.inf if top >= self.whole(self.tank)[2] else top
+        return np.stack([x - left, right - x, side - y, above - z])
+
+    def solid_height(self, position: FloatArray) -> FloatArray:
+        """Return how far points (n, 3) lie outside of the box, beyond the farthest of its faces [H]."""
+        return np.asarray(-self._depths(position).min(axis=0))
+
     @cached_property
     def _solid(self) -> Solid:
         """Cells of the box, which stands on the floor and reaches to the plane of symmetry."""
-        (left, _, _), (right, side, top) = self.box
         axes = (cell_centres(count, self.particle_spacing) for count in self._cells(self.box[1] - self.box[0]))
         position = lattice(*axes) + self.box[0]
-        x, y, z = position.T
-        above = np.inf if top >= self.whole(self.tank)[2] else top
-        depths = np.stack([x - left, right - x, side - y, above - z])
+        depths = self._depths(position)
         normals = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
         least = depths.min(axis=0)
         near = depths < least + 1e-6 * self.particle_spacing  # in edges and corners the bisector

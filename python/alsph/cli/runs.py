@@ -188,6 +188,8 @@ def _drawings(run: "alsph.Run", bodies: list[str]) -> dict[str, Callable[[], Any
     drawings["ledger"] = run.plot_ledger
     if len(run.gauges.time):
         drawings["gauges"] = run.plot_gauges
+    if len(run.probes.time):
+        drawings["probes"] = run.plot_probes
     settles = run.config.case.settles
     if run.body:
         drawings |= {"forces": run.plot_forces} | ({"spectrum": run.plot_spectrum} if settles else {})

@@ -1,7 +1,7 @@
 """Figures of runs and of their fields, as pure functions: results in, :class:`matplotlib.figure.Figure` out."""
 
 from alsph.plotting.animation import Film, animate
-from alsph.plotting.curves import Curve, convergence, gauges, panels, pressure_coefficient, profile
+from alsph.plotting.curves import Curve, convergence, gauges, panels, pressure_coefficient, probes, profile
 from alsph.plotting.histories import coefficients, forces, ledger, spectrum
 from alsph.plotting.pictures import FIELDS, extent_of, field, field_style, fields
 from alsph.plotting.style import PALETTE, head, remark, rename, save
@@ -24,6 +24,7 @@ __all__ = [
     "ledger",
     "panels",
     "pressure_coefficient",
+    "probes",
     "profile",
     "remark",
     "rename",

@@ -11,19 +11,19 @@ import numpy as np
 
 from alsph.analysis.loads import PressureCoefficient
 from alsph.analysis.measures import Profile
-from alsph.analysis.probes import GaugeRecord
+from alsph.analysis.probes import GaugeRecord, Probes
 from alsph.analysis.window import DEVELOPING
-from alsph.arrays import FloatArray
+from alsph.arrays import AXES, FloatArray
 from alsph.geometry.surface import Surface
-from alsph.plotting.style import MARKERS, PALETTE, blank, line
+from alsph.plotting.style import MARKERS, PALETTE, TIME_LABEL, blank, line
 from alsph.text import in_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_GAUGES = 10
-"""Of which a figure shows the depth."""
+MOST_PLACES = 10
+"""Gauges and probes that a figure shows."""
 
 
 def pressure_coefficient(
@@ -137,18 +137,51 @@ def profile(curves: dict[str, Profile]) -> Figure:
 
 def gauges(record: GaugeRecord) -> Figure:
     """Draw the depth of the water over time, of ten gauges where there are more."""
-    count = len(record.position)
-    shown = np.unique(np.linspace(0, count - 1, min(count, MOST_GAUGES)).round().astype(int))
-    title = "depth at the gauges" + (f", {len(shown)} of {count}" if len(shown) < count else "")
+    shown, told = _some(record.position)
     nothing = (np.empty(0), np.empty(0))
     return profile(
         {
-            ", ".join(f"${axis}/D$ = {at:g}" for axis, at in zip("xy", record.position[index], strict=False)): Profile(
-                title, ("$tU/D$", "depth over $D$"), (record.time, record.depth[:, index]), nothing, ""
+            _place(record.position[index]): Profile(
+                f"depth at the gauges{told}",
+                (TIME_LABEL, "depth over $D$"),
+                (record.time, record.depth[:, index]),
+                nothing,
+                "",
             )
             for index in shown
         }
     )
+
+
+def probes(record: Probes) -> Figure:
+    """Draw velocity and pressure over time, of ten probes where there are more."""
+    shown, told = _some(record.position)
+    labels = [f"${symbol}/U$" for symbol in "uvw"[: record.position.shape[1]]] + [r"$p\,/\,\rho U^2$"]
+    figure = blank(9, 1 + 2 * len(labels))
+    grid = figure.subplots(len(labels), 1, sharex=True)
+    columns = [*np.moveaxis(record.velocity, 2, 0), record.pressure]
+    for axes, label, values in zip(grid, labels, columns, strict=True):
+        for number, index in enumerate(shown):
+            drawn = line(number, len(shown), len(record.time))
+            axes.plot(record.time, values[:, index], lw=1, label=_place(record.position[index]), **drawn)
+        axes.set_ylabel(label)
+        axes.grid(alpha=0.3)
+    grid[0].set_title(f"at the probes{told}", loc="left", fontsize="medium")
+    grid[-1].set_xlabel(TIME_LABEL)
+    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside right upper", fontsize="small", frameon=False)
+    return figure
+
+
+def _some(places: FloatArray) -> tuple[list[int], str]:
+    """Return the indices of the places (m, d) that a figure shows, and what it says of the others."""
+    count = len(places)
+    shown = np.unique(np.linspace(0, count - 1, min(count, MOST_PLACES)).round().astype(int)).tolist()
+    return shown, f", {len(shown)} of {count}" if len(shown) < count else ""
+
+
+def _place(place: FloatArray) -> str:
+    """Return the name of a place (d,) in a figure."""
+    return ", ".join(f"${axis}/D$ = {at:g}" for axis, at in zip(AXES, place, strict=False))
 
 
 @dataclass(frozen=True)

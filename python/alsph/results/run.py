@@ -349,6 +349,10 @@ class Run(Loads):
         """Figure of the depth at the run's gauges over time, of ten where there are more; saved if `path` is given."""
         return self._saved(_plotting().gauges(self.gauges), path)
 
+    def plot_probes(self, path: str | Path | None = None) -> Figure:
+        """Figure of velocity and pressure at the run's probes over time, of ten at most; saved if `path` is given."""
+        return self._saved(_plotting().probes(self.probes), path)
+
     def plot_ledger(self, path: str | Path | None = None) -> Figure:
         """Figure of divergence, iterations, time step, volume, mass and energy over time; saved if `path` is given."""
         return self._saved(_plotting().ledger(self), path)
