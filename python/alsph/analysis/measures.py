@@ -1,5 +1,6 @@
 """What a run is judged by: numbers and profiles beside their reference values."""
 
+import html
 import math
 import re
 from dataclasses import dataclass, replace
@@ -7,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from alsph.analysis.averages import Estimate
 from alsph.arrays import FloatArray
 
 
@@ -47,6 +49,28 @@ class Measure:
     def passed(self) -> bool:
         """Whether the error is within the tolerance; a NaN is not."""
         return abs(self.error) <= self.tolerance
+
+
+class Measures(list[Measure]):
+    """Measures, which notebooks show as a table."""
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><th>{html.escape(measure.name)}</th>"
+            + "".join(
+                f"<td>{html.escape(text)}</td>"
+                for text in (
+                    f"{measure.value}" if isinstance(measure.value, Estimate) else f"{measure.value:.5g}",
+                    "" if math.isnan(measure.reference) else f"{measure.reference:.5g}",
+                    "" if math.isnan(measure.error) or not measure.reference else f"{100 * measure.error:+.2g} %",
+                    measure.source,
+                )
+            )
+            + "</tr>"
+            for measure in self
+        )
+        titles = "".join(f"<th>{title}</th>" for title in ("", "value", "reference", "error", "source"))
+        return f"<table><tr>{titles}</tr>{rows}</table>"
 
 
 @dataclass(frozen=True, eq=False)

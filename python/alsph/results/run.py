@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 import shlex
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alsph.analysis.averages import Estimate
-from alsph.analysis.measures import Measure, Profile
+from alsph.analysis.measures import Measure, Measures, Profile
 from alsph.analysis.probes import GaugeRecord
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
@@ -89,9 +90,9 @@ class Run(Loads):
         return str(self.info.get("status", "unknown"))
 
     @cached_property
-    def measures(self) -> list[Measure]:
+    def measures(self) -> Measures:
         """What the run is judged by: numbers beside their reference values; none if the case's own code fails."""
-        return self._judged[0]
+        return Measures(self._judged[0])
 
     @cached_property
     def _judged(self) -> tuple[list[Measure], list[str]]:
@@ -207,8 +208,9 @@ class Run(Loads):
             waves = "" if self.config.case.is_weakly_compressible else " of the penalty"
             results[f"artificial Mach number{waves}"] = Estimate(mach_number(self.history))
         for measure in self.measures:
-            value = measure.value
-            results[measure.name] = value if isinstance(value, Estimate) else Estimate(value)
+            value = measure.value if isinstance(measure.value, Estimate) else Estimate(measure.value)
+            told = np.isnan(value) and value.note == self.window.rule
+            results[measure.name] = Estimate(math.nan, note="see averaging rule") if told else value
             if np.abs(measure.reference) > 0:
                 results[f"{measure.name}, reference"] = Estimate(measure.reference)
         return results

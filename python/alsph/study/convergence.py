@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -157,6 +158,13 @@ class Report:
     def __str__(self) -> str:
         """Return the table, and what is missing in it."""
         return "\n\n".join(filter(None, (self._table(), "\n".join(f"- {gap}" for gap in self.gaps))))
+
+    def __repr__(self) -> str:
+        """Name the folder and the resolutions."""
+        return f"Report('{self.path}': {', '.join(str(row['resolution']) for row in self.results.rows)})"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(str(self))}</pre>"
 
     def _table(self) -> str:
         if not self.convergences:
