@@ -209,6 +209,25 @@ def test_sides_that_cross_in_their_last_digits_are_cut_there_and_it_is_told(scal
         read(tmp_path, rows([*UPPER[-3::-1], *LOWER[1:-1], (0.6, 0.2)]))
 
 
+def test_an_open_curve_is_closed_and_it_is_told(tmp_path):
+    angle = np.linspace(0, np.pi, 31)
+    half = np.stack([0.5 * np.cos(angle), 0.3 * np.sin(angle)], axis=1)
+    outline = read(tmp_path, rows(half))
+    told = "it is open, and was closed by an edge from (-0.5, 0) to (0.5, 0), 19 times as long as any other"
+    assert outline.remark == told and outline.polygons[0].area == pytest.approx(0.15 * np.pi / 2, rel=0.01)
+    assert f"outline: foil.txt: {told}" in Body(shape=outline, length=6, height=5, upstream=2).remarks()
+    for closed in (SQUARE, rows(FOIL.exterior.coords), rows([*half, [0.0, 0.0]])):
+        assert read(tmp_path, closed).remark == ""
+
+
+def test_a_body_in_other_units_is_told_of_scale(tmp_path):
+    with pytest.raises(ConfigError, match="100 D long and 40 D high, comes 46 D beyond a side.*by `scale` what"):
+        Body(shape=read(tmp_path, "0 0\n100 0\n100 40\n0 40\n"))
+    assert Body(shape=read(tmp_path, "0 0\n100 0\n100 40\n0 40\n"), scale=0.01).size == 1.0
+    with pytest.raises(ConfigError, match="within 0.25 D of a side of the channel; leave at least 0.5 D$"):
+        Body(shape=shapely.box(0, 0, 3, 1), scale=1.0, upstream=1.75)
+
+
 def test_no_folder_device_pipe_or_giant_is_read(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with (tmp_path / "giant").open("wb") as file:

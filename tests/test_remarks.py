@@ -136,7 +136,8 @@ def test_what_is_cut_off_a_body_and_thin_bodies_are_remarked_upon():
     assert cut.startswith(
         "thin parts: cut off, for they are thinner than 2 Δx: up to 0.41 D of tips, 33 % of the area;"
     )
-    assert thin.startswith("thin body: 2.4 Δx at its thickest")
+    assert thin.startswith("thin body: the body is 2.4 Δx at its thickest;") and "resolution = 67 makes it 8 Δx" in thin
+    assert not [each for each in said(67, shape="naca0012") if each.startswith("thin body")]
     assert len(said(40, shape="naca0012")) == 2
     (cut,) = said(80, shape="naca0012")
     assert "thin parts" in cut

@@ -182,4 +182,5 @@ def _mistake(model: type[Parameters], mistake: Any) -> str:
     if words == WHOLE and isinstance(value, float) and value.is_integer():
         words += f", as {value:.0f}"
     typed = shown(value, LONGEST_PATH) if isinstance(value, str) else shown(value)
-    return f"{name} = {typed}: {words} ({model.describe(str(mistake['loc'][0]))})"
+    told = isinstance(mistake.get("ctx", {}).get("error"), ConfigError)  # such as what is wrong with a line of a file
+    return f"{name} = {typed}: {words}" + ("" if told else f" ({model.describe(str(mistake['loc'][0]))})")

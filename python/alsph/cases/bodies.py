@@ -58,12 +58,17 @@ class Bodies(Channel):
             self.upstream + left, self.length - self.upstream - right, bottom + self.height / 2, self.height / 2 - top
         )
         if room < 0.5:
-            what, come = ("the body", "comes") if len(self.outlines) == 1 else ("the bodies together", "come")
-            raise ValueError(
-                f"{what}, {right - left:.3g} D long and {top - bottom:.3g} D high, {come} within {room:.3g} D of a "
-                "side of the channel; leave at least 0.5 D"
-            )
+            one = len(self.outlines) == 1
+            what, come = ("the body", "comes") if one else ("the bodies together", "come")
+            where = f"within {room:.3g} D of a side" if room >= 0 else f"{-room:.3g} D beyond a side"
+            size = f"{right - left:.3g} D long and {top - bottom:.3g} D high"
+            raise ValueError(f"{what}, {size}, {come} {where} of the channel; leave at least 0.5 D{self._hint}")
         return self
+
+    @property
+    def _hint(self) -> str:
+        """What else may help where the bodies do not fit in."""
+        return ""
 
     @property
     def outlines(self) -> list[shapely.Polygon]:
@@ -163,7 +168,8 @@ class Bodies(Channel):
         ]
         near = remarks.gaps(self.coefficient_bodies, self.carried, self.particle_spacing)
         pockets = remarks.holes(self.outlines, self.carried)
-        return [*super().remarks(), *thin, *near, *pockets, *remarks.unknown(len(self.outlines) > 1)]
+        several = remarks.several(self.coefficient_bodies)
+        return [*super().remarks(), *several, *thin, *near, *pockets, *remarks.unknown(bool(several))]
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces on all bodies together, the Strouhal number, and the mean forces on each of several."""

@@ -15,6 +15,7 @@ from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases.bodies import Bodies
+from alsph.errors import ConfigError
 from alsph.geometry.naca import NAME, naca
 from alsph.geometry.outline import Outline
 from alsph.geometry.surface import Surface, along, edges
@@ -63,7 +64,8 @@ class Body(Bodies):
             return Outline(**shape)
         if isinstance(shape, str | os.PathLike):
             if not os.path.exists(shape):
-                raise ValueError("neither square_cylinder nor a NACA airfoil (naca0012) nor a file that is there")
+                told = "neither square_cylinder nor a NACA airfoil (naca0012) nor a file that is there"
+                raise ConfigError(told) if os.path.splitext(shape)[1] else ValueError(told)
             return Outline.read(shape)
         return shape if isinstance(shape, Outline) else Outline.of(shape)
 
@@ -82,6 +84,16 @@ class Body(Bodies):
             outline = affinity.scale(outline, self.scale, self.scale, origin=(0, 0))
         centred = affinity.translate(outline, -outline.centroid.x, -outline.centroid.y)
         return affinity.rotate(centred, -self.angle_of_attack, origin=(0, 0))
+
+    @property
+    def _hint(self) -> str:
+        return "" if self.scale or isinstance(self.shape, str) else ", or say by `scale` what its file's unit is in D"
+
+    def remarks(self) -> list[str]:
+        """Return what is to be said, first of how the file was read."""
+        if isinstance(self.shape, str) or not self.shape.remark:
+            return super().remarks()
+        return [f"outline: {self.shape.file}: {self.shape.remark}", *super().remarks()]
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces, among them what a body at an angle has: mean lift and moment; and the Strouhal number."""

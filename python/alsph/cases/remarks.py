@@ -243,7 +243,8 @@ def thin(name: str, shape: Polygon, left: Polygon | MultiPolygon, spacing: float
         found.append(f"thin parts: {text}; they come back with resolution")
     if thick < 0.99 * THICK * spacing:
         known = "lift and drag were found off by 17 to 23 % below 3 Δx, by 4 % at 5 Δx"
-        found.append(f"thin body: {thick / spacing:.2g} Δx at its thickest; {known}; use a finer resolution")
+        text = f"the {name} is {thick / spacing:.2g} Δx at its thickest"
+        found.append(f"thin body: {text}; {known}; resolution = {math.ceil(THICK / thick)} makes it {THICK:g} Δx")
     return found
 
 
@@ -258,7 +259,9 @@ def thin_in_space(name: str, body: Volume, spacing: float) -> list[str]:
         text = f"{100 * (1 - share):.2g} % of the {name} is thinner than {THINNEST:g} Δx"
         found.append(f"thin parts: {text}; each face there has half a wall, and loads are uncertain")
     if thick < 0.95 * THICK:  # it is known to some per cent
-        found.append(f"thin body: {thick:.2g} Δx at its thickest; use a finer resolution")
+        enough = math.ceil(THICK / (thick * spacing))
+        text = f"the {name} is {thick:.2g} Δx at its thickest"
+        found.append(f"thin body: {text}; resolution = {enough} makes it {THICK:g} Δx")
     return found
 
 
@@ -281,6 +284,13 @@ def unknown(several: bool = False) -> list[str]:
     """Remark on a body that nothing is known of."""
     what = "these bodies; they have" if several else "this body; it has"
     return [f"not validated: flow past {what} not been compared with the results of others"]
+
+
+def several(names: Sequence[str]) -> list[str]:
+    """Remark on drag and lift of more than one body."""
+    if len(names) < 2:
+        return []
+    return [f"several bodies: drag and lift are those of all {len(names)} together; those of each stand beside them"]
 
 
 def derived(model: type) -> list[str]:

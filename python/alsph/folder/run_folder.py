@@ -95,7 +95,8 @@ class RunFolder:
             found = {entry.name for entry in self.path.iterdir()} if self.path.is_dir() else {self.path.name}
             if found - {LOCK} and not force:
                 raise RunFolderError(
-                    f"{self.path}: exists already; give another folder, `alsph resume` it, or use --force"
+                    f"{self.path}: exists already; give another folder, `alsph resume` it, or use --force "
+                    "(in Python force=True)"
                 )
             if found - {LOCK} and not self._is_replaceable(configuration):
                 raise RunFolderError(

@@ -26,6 +26,8 @@ MOST_REPAIRED = 2000
 """Most points of a curve that meets itself somewhere."""
 DEEPEST = 10
 """Most curves that one may lie within."""
+OPEN = 3.0
+"""How many times as long as the longest other edge that is which closes a curve of which is said that it is open."""
 SLIVER = 1e-3
 """Largest part of a body that is cut off where its sides cross, as those of airfoils do in their last digits [-]."""
 SHORTENED = 0.02
@@ -169,7 +171,7 @@ def _closed(curve: list[Line], name: str) -> tuple[shapely.Polygon, str]:
     drawn = shapely.Polygon([point.values for point in points])
     size = math.dist(drawn.bounds[:2], drawn.bounds[2:])
     if drawn.is_valid and drawn.area > 1e-9 * size**2:
-        return drawn, ""
+        return drawn, _closing(curve)
     edges = shapely.linestrings([[one.values, two.values] for one, two in pairwise([*points, points[0]])])
     x, y = map(float, (shapely.is_valid_reason(drawn).partition("[")[2].rstrip("]") or "nan nan").split())
     parts = _parts_of(drawn, edges)
@@ -187,6 +189,16 @@ def _closed(curve: list[Line], name: str) -> tuple[shapely.Polygon, str]:
     if max(lost, shorter) < 1e-6:
         return body, ""
     return body, f"its sides cross at ({x:.4g}, {y:.4g}), and {100 * shorter:.2g} % of its length is cut off there"
+
+
+def _closing(curve: list[Line]) -> str:
+    """Say by what edge a curve was closed whose points end far from where they began; nothing if they do not."""
+    lengths = [math.dist(one.values, two.values) for one, two in pairwise(curve)]
+    last = math.dist(curve[-1].values, curve[0].values)
+    if last < OPEN * max(lengths):
+        return ""
+    ends = " to ".join(f"({x:.4g}, {y:.4g})" for x, y in np.round([curve[-1].values, curve[0].values], 9) + 0.0)
+    return f"it is open, and was closed by an edge from {ends}, {last / max(lengths):.0f} times as long as any other"
 
 
 def _parts_of(drawn: shapely.Polygon, edges: NDArray[np.object_]) -> list[shapely.Polygon]:
