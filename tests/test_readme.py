@@ -2,6 +2,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
 from alsph import cases, config
 
 README = Path(__file__).parent.parent / "README.md"
@@ -28,6 +29,16 @@ def test_the_python_example_runs(tmp_path, monkeypatch, capsys):
 def test_the_configuration_file_is_valid():
     (example,) = re.findall(r"```toml\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
     assert config.from_tables(tomllib.loads(example)).until == 60
+
+
+def test_files_in_the_guide_of_running_are_configurations(tmp_path):
+    text = (README.parent / "docs" / "running.md").read_text(encoding="utf-8")
+    wing, units = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    for name, content in (("wing", wing), ("water", 'case = "cylinder"\n' + units)):
+        (tmp_path / f"{name}.toml").write_text(content, encoding="utf-8")
+    read = config.load(tmp_path / "wing.toml")
+    assert (read.case.resolution, read.case.angle_of_attack, len(read.probes), read.until) == (40, 8.0, 22, 20)
+    assert config.load(tmp_path / "water.toml").case.reynolds == pytest.approx(200)
 
 
 ADD_YOUR_OWN = README.parent / "docs" / "add_your_own.md"
