@@ -123,20 +123,21 @@ fn fluid_is_lost_three_quarters_of_a_spacing_under_a_surface() {
     assert!((at(&[1.74], 3.9).expect("lost") - 1.1).abs() < 1e-12);
     // Of two at one place, for the two faces of a plate, only the one whose face the fluid is on says how deep it is.
     assert_eq!(at(&[0.5, 2.5], 4.1), None);
-    // How far off their other face is counts for fluid within a spacing alone: here there are 1.5 of them, along the base of a wedge.
-    let beside = |cell: [f64; 2]| {
-        let cells = [[0.0, 0.0], cell, cell].map(|cell| Vector::from(cell).add_scalar(6.0) * SPACING);
+    // How far off the other face is counts for fluid within a spacing alone.
+    let above = |height: f64, deeper: f64| {
+        let cells = [[0.0, height], [0.0, 0.0], [0.0, 0.0]].map(|cell| Vector::from(cell).add_scalar(6.0) * SPACING);
         let mut particles = common::particles(cells.to_vec());
-        for (i, depth, normal) in [(1, 0.5, -1.0), (2, 3.0, 1.0)] {
+        for (i, depth, normal) in [(1, 0.5, -1.0), (2, deeper, 1.0)] {
             (particles.kind[i], particles.depth[i]) = (ParticleKind::Solid, depth * SPACING);
             particles.normal[i][1] = normal;
         }
         let set = Set::of(particles, &settings, false);
-        find(&settings, &set.particles, &set.frame, &[], TIME_STEP).filter(|symptom| symptom.field == "position")
+        let found =
+            find(&settings, &set.particles, &set.frame, &[], TIME_STEP).filter(|symptom| symptom.field == "position");
+        found.map(|symptom| symptom.value / SPACING)
     };
-    assert_eq!(beside([-1.5, 0.0]), None);
-    let found = beside([-0.9, 0.0]).expect("lost");
-    assert!((found.value / SPACING - 2.1).abs() < 1e-12);
+    assert_eq!(above(1.4, 3.0), None);
+    assert!((above(0.6, 1.5).expect("lost") - 0.9).abs() < 1e-12);
 }
 
 #[test]
