@@ -248,8 +248,10 @@ def test_the_arrangement_does_not_depend_on_the_unit_of_length(turn):
 
 def test_heights_above_a_body():
     points = np.array([[0.5, 1.5], [0.5, 0.8], [2.0, 2.0], [1.3, 0.5], [-0.45, 0.5]])
-    assert packing._height(packing.Planar(SQUARE), points) == pytest.approx([0.5, -0.2, np.sqrt(2), 0.3, 0.45])
-    assert packing._height(packing.Planar(SQUARE), points, 0.4) == pytest.approx([np.inf, -0.2, np.inf, 0.3, np.inf])
+    assert packing.height_over(packing.Planar(SQUARE), points) == pytest.approx([0.5, -0.2, np.sqrt(2), 0.3, 0.45])
+    assert packing.height_over(packing.Planar(SQUARE), points, 0.4) == pytest.approx(
+        [np.inf, -0.2, np.inf, 0.3, np.inf]
+    )
     assert packing._around(points, packing.Planar(SQUARE), 0.46).tolist() == points[[1, 3, 4]].tolist()
 
 
@@ -292,12 +294,12 @@ def test_fluid_that_is_even_stays_and_the_rest_moves_apart():
     solid = solids.body_layers(wider, spacing, 3).position
     fluid = packing.pack(cells, packing.Planar(wider), solid, spacing)
     assert len(fluid) == 376  # 400 - 25 are not in pairs
-    assert same(fluid, fluid * (1, -1)) and packing._height(packing.Planar(wider), fluid).min() > 0.39 * spacing
+    assert same(fluid, fluid * (1, -1)) and packing.height_over(packing.Planar(wider), fluid).min() > 0.39 * spacing
     assert KDTree(fluid).query(fluid, 2)[0][:, 1].min() > 0.75 * spacing
-    height = packing._height(packing.Planar(wider), fluid)
+    height = packing.height_over(packing.Planar(wider), fluid)
     free = fluid[(height > 0.41 * spacing) & (height < 4 * spacing)]
     offset = (free[:, None] - np.concatenate([fluid, solid])) / spacing
     push = (offset * np.exp(-0.5 * (offset**2).sum(axis=2, keepdims=True) / 0.6**2)).sum(axis=1)
     assert np.hypot(*push.T).max() < 0.006  # a neighbour a spacing off pushes with 0.25
-    far = cells[packing._height(packing.Planar(wider), cells) > 4 * spacing]
+    far = cells[packing.height_over(packing.Planar(wider), cells) > 4 * spacing]
     assert same(fluid[: len(far)], far)

@@ -151,5 +151,5 @@ def test_numbers_and_arrays_are_asked_for_in_plain_words(small):
         with pytest.raises(ConfigError, match=message):
             use()
     simulation.set_inflow(lambda position, time: "fast")
-    with pytest.raises(ConfigError, match="array `inflow velocity`: must hold numbers"):
+    with pytest.raises(ConfigError, match="inflow: the function must give 2 numbers a position"):
         simulation.advance(1)

@@ -40,6 +40,14 @@ def exit_codes() -> Iterator[None]:
     except KeyboardInterrupt as stop:
         complain(str(stop) or "interrupted")
         raise typer.Exit(stop.exit_code if isinstance(stop, Interrupted) else INTERRUPTED) from None
+    except Exception as error:  # in a function of the user's, or a defect of alsph's
+        from alsph.engine.prescribed import FAILED
+
+        told = [note for note in getattr(error, "__notes__", []) if FAILED in note]
+        if not told:
+            raise
+        complain(f"error: {told[0]}", "red")
+        raise typer.Exit(2) from None
 
 
 def say(text: object) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alsph.arrays import FloatArray
-from alsph.errors import AlsphError, ConfigError
+from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import lattice
 
@@ -32,6 +32,9 @@ WORDS = {
     "motion": "motion of bodies",
 }
 """What the rules prescribe."""
+
+FAILED = ": the function failed"
+"""What the note on an exception says that a rule has raised."""
 
 KEPT = 256
 """Of how many positions, and as many where it is largest, it is kept what a body force or sliding surface was."""
@@ -79,16 +82,16 @@ def asked(name: str, rule: Rule, position: FloatArray, time: float) -> FloatArra
     Raises
     ------
     ConfigError
-        If they are none, or the rule fails; the message says where it stands.
+        If they are none; the message says where the rule stands. What the rule itself raises comes out as it is, with
+        a note that says so, too.
     """
     try:
         values = rule(position.copy(), time)
-    except AlsphError:
-        raise
     except Exception as error:
         *_, frame = traceback.extract_tb(error.__traceback__)
         told = f"{frame.filename}: line {frame.lineno}: {type(error).__name__}: {error}"
-        raise ConfigError(f"{name}: the function failed at t* = {time:.6g}: {told}") from error
+        error.add_note(f"{name}{FAILED} at t* = {time:.6g}: {told}")
+        raise
     if values is None and name == "inflow":
         return None
     try:
