@@ -1,11 +1,13 @@
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from alsph import Run, validate
 from alsph.analysis import averages
 from alsph.analysis.measures import Measure
 from alsph.cases import TaylorGreen
+from alsph.cli.studies import _validated
 from alsph.errors import ConfigError, SolverError
 from alsph.running.driver import Driver
 from alsph.study import validation
@@ -155,7 +157,9 @@ def test_the_shipped_suites_can_be_built():
 
 
 def test_mistakes_in_python(tmp_path):
-    with pytest.raises(ConfigError, match=r"cylinder: not in this suite; use --full \(full=True\)"):
+    with pytest.raises(
+        ConfigError, match=r"cylinder: only in the full suite, which takes longer; use --full \(full=True\)"
+    ):
         validate("cylinder", output=tmp_path / "out")
     with pytest.raises(ConfigError, match="did you mean 'taylor_green'"):
         validate("tayler_green", output=tmp_path / "out")
@@ -178,7 +182,7 @@ def test_command_line(fast, alsph, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["cylinder"], "cylinder: not in this suite; use --full"),
+        (["cylinder"], "cylinder: only in the full suite, which takes longer; use --full"),
         (["cylindr"], "did you mean 'cylinder'?"),
         (["--resolution", "4"], "resolution = 4: must be greater than or equal to 8"),
         (["--threads", "0"], "threads = 0: must be greater than or equal to 1"),
@@ -194,3 +198,47 @@ def test_the_report_carries_the_remarks_on_its_runs(finished, monkeypatch):
     monkeypatch.setattr(TaylorGreen, "remarks", lambda self: ["coarse: of few particles; take more"])
     again = replace(finished, runs=[Run(run.path) for run in finished.runs])
     assert "| coarse" in again.to_markdown() and "remarks" in finished.to_markdown()
+
+
+OWN = """
+from alsph.analysis.measures import Measure
+from alsph.cases import TaylorGreen
+
+
+class Gauged(TaylorGreen):
+    resolution: int = 12
+
+    @property
+    def default_until(self):
+        return 0.05
+
+    def measures(self, run):
+        return [Measure("number of particles", run.info["particles"]["fluid"], self.resolution**2, 1e-9, "a square")]
+"""
+
+
+def test_a_case_of_ones_own_is_validated_at_its_own_resolution_or_those_given(alsph, tmp_path):
+    (tmp_path / "own.py").write_text(OWN)
+    own, options = f"{tmp_path}/own.py:Gauged", ["-o", tmp_path / "out"]
+    code, stdout, stderr = alsph("validate", own, *options)
+    assert "All well: 1 of 1" in stdout and "| gauged" in stdout, stderr
+    assert (tmp_path / "out" / "gauged_resolution_12").is_dir()
+    code, stdout, _ = alsph("validate", own, "--resolution", 10, "--resolution", 12, *options)
+    assert (code, "run 2 of 2: gauged, resolution 12" in stdout, "All well: 1 of 1" in stdout) == (0, True, True)
+
+
+def test_a_case_in_neither_suite_has_an_entry_of_its_own():
+    (entry,) = validation._chosen(["cylinder_pair"], False, None)
+    case = entry.model()
+    assert (entry.resolutions, entry.until) == ((case.resolution,), case.default_until)
+    suites = {entry.case for entry in (*validation.QUICK, *validation.FULL)}
+    assert "cylinder_pair" not in suites
+
+
+def test_completion_offers_what_validate_takes():
+    offered = {}
+    for full in (False, True):
+        offered[full] = _validated(SimpleNamespace(params={"full": full}))
+        for name in offered[full]:
+            assert validation._chosen([name], full, None)
+    assert "cylinder" in set(offered[True]) - set(offered[False])

@@ -27,6 +27,8 @@ from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from alsph.results.run import Run
 
 WORD = re.compile(r"(?<=[a-z0-9])(?=[A-Z][a-z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[a-z])(?=[A-Z])")
@@ -240,6 +242,19 @@ class Case(Discretised):
         state = self.particles()
         self._warn_of_unused_velocities(state)
         return self.problem(state)
+
+    def draw(self) -> Figure:
+        """Return a picture of the start: particles, outlines, the thinnest part, what closes the sides.
+
+        Raises
+        ------
+        ConfigError
+            If the particles would not fit into the memory that is free.
+        """
+        from alsph.config import Config
+        from alsph.running.describe import drawn
+
+        return drawn(Config(self))
 
     def _warn_of_unused_velocities(self, state: dict[str, NDArray[Any]]) -> None:
         """Warn if solid particles have velocities that are not those of their body, which are the ones that hold."""

@@ -10,9 +10,11 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
+import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
+from alsph.arrays import FloatArray
 from alsph.geometry import thin as thin_bodies
 from alsph.geometry.thin import NARROWEST_HOLE, THINNEST, carried, thickness
 from alsph.geometry.volume import Volume
@@ -26,6 +28,9 @@ CELL_REYNOLDS = 20.0
 
 NARROWEST = {"quintic_spline": 1.2, "wendland_c2": 1.5, "wendland_c4": 1.5}
 """Smoothing ratio h/Δx below which a kernel has been found to err (docs/experiments.md, Kernels)."""
+
+MOST_POINTS = 4000
+"""About how many points of an outline are looked at, beside its corners."""
 
 LARGEST_BLOCKAGE = 0.1
 """Share of a channel's height; at 0.077 the walls raise a cylinder's drag by 15 % (reference solutions, Re = 100)."""
@@ -190,8 +195,16 @@ def protrusion(shape: Polygon | MultiPolygon, thickness: float) -> float:
 
 def reach(shape: Polygon | MultiPolygon, rest: Polygon | MultiPolygon, step: float) -> float:
     """Return how far [D] a shape reaches beyond what is left of it, by points of its outline up to `step` apart."""
-    outline = shapely.get_coordinates(shapely.segmentize(shape, step))
-    return float(shapely.distance(rest, shapely.points(outline)).max())
+    return float(shapely.distance(rest, shapely.Point(tip(shape, rest, step))))
+
+
+def tip(shape: Polygon | MultiPolygon, rest: Polygon | MultiPolygon, step: float) -> FloatArray:
+    """Return the point (2,) of a shape's outline that is farthest from what is left of it, of those `reach` looks at.
+
+    Its corners are always among them.
+    """
+    outline = shapely.get_coordinates(shapely.segmentize(shape, max(step, shape.length / MOST_POINTS)))
+    return np.asarray(outline[shapely.distance(rest, shapely.points(outline)).argmax()])
 
 
 def thinnest(shape: Polygon | MultiPolygon) -> float:
@@ -210,6 +223,13 @@ def thinnest(shape: Polygon | MultiPolygon) -> float:
         else:
             thin = middle
     return thin
+
+
+def thinnest_tip(shape: Polygon | MultiPolygon, spacing: float) -> FloatArray:
+    """Return where (2,) the thinnest part of a shape ends, one thinner than 2 Δx if it tapers to an edge."""
+    thick = max(1.05 * thinnest(shape), THINNEST * spacing)
+    rest = shape.buffer(-0.5 * thick).buffer(0.5 * thick)
+    return tip(shape, shape.centroid if rest.is_empty else rest, 0.25 * spacing)
 
 
 def thin(name: str, shape: Polygon, left: Polygon | MultiPolygon, spacing: float) -> list[str]:

@@ -18,6 +18,9 @@ from alsph.cli.terminal import say, say_run, say_table
 from alsph.errors import ConfigError
 from alsph.running.control import Control, seconds_of
 
+DPI = 150
+"""Pixels an inch of the picture of a start."""
+
 
 def _run(
     given: Given,
@@ -35,10 +38,17 @@ def _run(
 def _describe(
     given: Given,
     probe: Annotated[bool, typer.Option(help="take a few steps to estimate the time")] = True,
+    draw: Annotated[
+        Path | None,
+        typer.Option(help="draw particles, outlines, sides and recorded points to this file", show_default="none"),
+    ] = None,
 ) -> None:
-    from alsph.running.describe import describe
+    from alsph.running.describe import describe, drawn, starting
 
-    say_table(describe(given.config, probe=probe))
+    state = starting(given.config)
+    if draw:
+        alsph.plotting.save(drawn(given.config, state), draw, dpi=DPI)
+    say_table(describe(given.config, state, probe=probe))
 
 
 def _autotune(

@@ -92,13 +92,22 @@ def _study_list() -> None:
     say_table([(name, alsph.study.load(name).title) for name in alsph.study.shipped()])
 
 
+def _validated(ctx: typer.Context) -> list[str]:
+    """Return the names of the cases of the suite that a command line chooses so far."""
+    from alsph.study.validation import FULL, QUICK
+
+    return sorted({entry.case for entry in (FULL if ctx.params.get("full") else QUICK)})
+
+
 @app.command("validate")
 @exit_codes()
 def _validate(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="CASE...", help="cases; all if none is given", autocompletion=lambda: list(alsph.cases.CASES)
+            metavar="CASE|FILE.py:CLASS...",
+            help="cases; all of the suite if none is given",
+            autocompletion=_validated,
         ),
     ] = None,
     full: Annotated[bool, typer.Option("--full/--quick", help="hours, or minutes, on two cores")] = False,
@@ -112,6 +121,7 @@ def _validate(
 ) -> None:
     """Run cases at several resolutions and compare them with their references.
 
+    A case of one's own, or one that is in neither suite, is run at its own resolution, or at those of --resolution.
     The exit code is 1 if a check fails. Runs are kept in the output folder and used again; a validation that was cut
     goes on when it is started again.
     """

@@ -39,7 +39,7 @@ class Entry:
     Attributes
     ----------
     case : str
-        Its name.
+        Its name, or ``FILE.py:CLASS``.
     resolutions : tuple of int
         Particles per reference length D/Δx, increasing; the finest one is judged, the others show the convergence.
     until : float
@@ -58,6 +58,11 @@ class Entry:
     continued: float | None = None
 
     @property
+    def model(self) -> type[cases.Case]:
+        """The case."""
+        return cases.find(self.case)
+
+    @property
     def settings(self) -> list[str]:
         """The parameters in words."""
         return [f"{name} {value}" for name, value in self.parameters.items()]
@@ -65,11 +70,11 @@ class Entry:
     @property
     def file_name(self) -> str:
         """Begin of the names of its run folders and figures."""
-        return "_".join([self.case, *self.settings]).replace(" ", "_")
+        return "_".join([self.model.name, *self.settings]).replace(" ", "_")
 
     def config(self, resolution: int, threads: int | None, coarser: Path | None = None) -> Config:
         """Return the case at a resolution and the settings of its run, which goes on with a coarser one if there is."""
-        case = cases.find(self.case)(**self.parameters, resolution=resolution)
+        case = self.model(**self.parameters, resolution=resolution)
         until, initial = (self.continued, str(coarser)) if self.continued and coarser else (self.until, None)
         settings = RunSettings(until=until, threads=threads, output_interval=until / SNAPSHOTS, initial_run=initial)
         return Config(case, settings)
@@ -172,7 +177,7 @@ class Row:
         """The row of the report's table."""
         measure = self.measure
         return (
-            self.entry.case,
+            self.entry.model.name,
             ", ".join(self.entry.settings),
             str(self.resolution),
             measure.name,
@@ -266,7 +271,8 @@ def validate(
     Parameters
     ----------
     *names
-        Cases to validate; all of the suite if none is given.
+        Cases to validate, by name or as ``FILE.py:CLASS``; all of the suite if none is given. One that is in neither
+        suite is run at its own resolution until its own end.
     full
         Take the full suite (hours) in place of the quick one (minutes).
     resolutions
@@ -309,13 +315,21 @@ def validate(
 
 
 def _chosen(names: Sequence[str], full: bool, suite: Sequence[Entry] | None) -> Sequence[Entry]:
-    """Return the entries of the suite for the cases with these names, all of them if there are no names."""
+    """Return the entries of the suite for the cases with these names, all of them if there are no names.
+
+    A case that is in neither suite has an entry of its own.
+    """
     suite = suite or (FULL if full else QUICK)
+    chosen = [entry for entry in suite if not names or entry.case in names]
     for name in names:
-        if cases.find(name).name not in [entry.case for entry in suite]:
-            elsewhere = "; use --full (full=True)" if not full and name in [entry.case for entry in FULL] else ""
-            raise ConfigError(f"{name}: not in this suite{elsewhere}")
-    return [entry for entry in suite if not names or entry.case in names]
+        model = cases.find(name)
+        if model.name in [entry.case for entry in chosen]:
+            continue
+        if not full and name in [entry.case for entry in FULL]:
+            raise ConfigError(f"{name}: only in the full suite, which takes longer; use --full (full=True)")
+        case = model()
+        chosen.append(Entry(name, (case.resolution,), until=case.default_until))
+    return chosen
 
 
 class _Heading:
@@ -378,7 +392,7 @@ def _draw(entry: Entry, runs: list[Run], rows: list[Row], path: Path) -> dict[st
         figures["convergence"] = plotting.convergence(errors)
     titles = {}
     for name, figure in figures.items():
-        plotting.rename(figure, cases.find(entry.case).symbols)
+        plotting.rename(figure, entry.model.symbols)
         plotting.save(figure, path / f"{entry.file_name}_{name}.png")
-        titles[f"{entry.file_name}_{name}.png"] = ", ".join([entry.case, *entry.settings, name.replace("_", " ")])
+        titles[f"{entry.file_name}_{name}.png"] = ", ".join([entry.model.name, *entry.settings, name.replace("_", " ")])
     return titles

@@ -1,0 +1,86 @@
+import numpy as np
+import pytest
+import shapely
+from alsph import cases
+from alsph.cases import CASES, Body, remarks
+from alsph.config import Config
+from alsph.geometry.particles import Kind
+from alsph.plotting.setup import CLOSED_BY, KINDS
+from alsph.run_settings import RunSettings
+from alsph.running.describe import drawn
+from matplotlib.collections import EllipseCollection
+from matplotlib.colors import to_rgba
+from shapely import Point, affinity
+
+TAPERED = shapely.Polygon([(0.6, 0.0), (-0.4, 0.15), (-0.4, -0.15)])
+PLATE = shapely.union_all([Point(0, 0).buffer(0.4), shapely.box(0, -0.06, 1.2, 0.06)])
+
+
+def circles(axes):
+    """Return the numbers of circles that are drawn of each kind of particles."""
+    drawn = [each for each in axes.collections if isinstance(each, EllipseCollection)]
+    assert [tuple(each.get_facecolor()[0]) for each in drawn] == [to_rgba(colour) for colour in KINDS.values()]
+    return [len(each.get_offsets()) for each in drawn]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_start_of_every_case_is_drawn_with_all_its_particles_and_sides(name):
+    case = CASES[name](resolution=8 if CASES[name].in_space == 3 else 10)
+    figure, state = case.draw(), case.particles()
+    whole = figure.axes[0]
+    found = dict(zip(KINDS, circles(whole), strict=True))
+    count = {kind: int((state["kind"] == kind).sum()) for kind in Kind}
+    flat = case.space_dimensions == 2
+    assert all(found[kind] == count[kind] if flat else found[kind] <= count[kind] for kind in Kind)
+    assert found[Kind.FLUID] > 0
+    sides = {CLOSED_BY[side] for pair in case.domain().boundaries[:2] for side in pair}
+    assert sides <= {text.get_text() for text in whole.texts} or not flat
+    assert len(figure.axes) == 1 + bool(case.coefficient_bodies)
+
+
+@pytest.mark.parametrize(
+    ("shape", "tip", "end"),
+    [
+        (TAPERED, (0.6, 0.0), None),
+        (affinity.rotate(TAPERED, 90, origin=(0, 0)), (0.0, 0.6), None),
+        (PLATE, (1.2, 0.06), (1.2, 0.06)),
+    ],
+)
+def test_the_thinnest_part_is_drawn_where_it_is(shape, tip, end):
+    spacing = 1 / 20
+    found = remarks.thinnest_tip(shape, spacing)
+    assert np.abs(found) == pytest.approx(tip, abs=spacing)
+    case = Body(shape=shape, resolution=20, length=7, height=5, upstream=2)
+    figure = case.draw()
+    name = figure.axes[2].get_title()
+    assert name == ("thinnest part: an edge" if shape is not PLATE else "thinnest part: 2.4 Δx")
+    left, right = figure.axes[2].get_xlim()
+    bottom, top = figure.axes[2].get_ylim()
+    there = np.array([left + right, bottom + top]) / 2 - case.centre
+    assert Point(there).distance(case.carried[0].boundary) < 1e-9
+    there += np.array(shape.centroid.coords[0])
+    if end:
+        assert np.abs(there) == pytest.approx(end, abs=0.5 * spacing)
+    else:
+        assert 0.1 < np.hypot(*(there - found)) < 0.5  # before the tip that is cut off
+
+
+def test_a_body_without_thin_parts_has_no_picture_of_them():
+    assert [axes.get_title() for axes in Body(resolution=10).draw().axes][1:] == ["bodies"]
+
+
+def test_recorded_points_are_drawn():
+    case = cases.Cylinder(resolution=10)
+    figure = drawn(Config(case, RunSettings(probes="6,0.5; 8,0")))
+    points = [line.get_xydata().tolist() for line in figure.axes[0].lines if line.get_marker() == "+"]
+    assert points == [[[6, 0.5], [8, 0]]]
+
+
+def test_the_surface_is_that_of_the_body():
+    figure = cases.Cylinder(resolution=20).draw()
+    surface = max((line.get_xydata() for line in figure.axes[1].lines), key=len)
+    assert np.hypot(*(surface - [4, 0]).T) == pytest.approx(0.5, abs=1e-3)
+
+
+def test_the_labels_have_the_names_of_the_case():
+    assert cases.DamBreak(resolution=10).draw().axes[0].get_xlabel() == "$x/H$"
