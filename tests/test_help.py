@@ -91,7 +91,7 @@ def test_a_parameter_that_must_be_given_says_so(alsph, tmp_path):
         (["info"], "info [OPTIONS] RUN"),
         (["compare"], "compare RUN RUN... | CASE --schemes LIST [OPTIONS]"),
         (["compare", "runs"], "compare runs [OPTIONS] RUN RUN..."),
-        (["validate"], "validate [OPTIONS] [CASE...]"),
+        (["validate"], "validate [OPTIONS] [CASE|FILE.py:CLASS...]"),
         (["run"], "run CASE|FILE.toml|FILE.py:CLASS [OPTIONS]"),
         (["study"], "study NAME|FILE.toml|COMMAND [OPTIONS]"),
         ([], "COMMAND [OPTIONS]"),

@@ -115,6 +115,7 @@ DOORS = {
     ("cases.base", "running.beginning"),  # Case.simulation
     ("cases.base", "running.control"),  # Case.run
     ("cases.base", "running.start"),
+    ("cases.base", "plotting"),  # Case.draw
     ("cases.base", "results.run"),  # the type of what Case.run returns
     ("results.run", "plotting"),  # Run.plot_...
 }

@@ -1,13 +1,12 @@
 import numpy as np
 import pytest
 import shapely
-from alsph import cases
+from alsph import cases, plotting
 from alsph.cases import CASES, Body, remarks
 from alsph.config import Config
 from alsph.geometry.particles import Kind
 from alsph.plotting.setup import CLOSED_BY, KINDS
 from alsph.run_settings import RunSettings
-from alsph.running.describe import drawn
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import to_rgba
 from shapely import Point, affinity
@@ -71,7 +70,7 @@ def test_a_body_without_thin_parts_has_no_picture_of_them():
 
 def test_recorded_points_are_drawn():
     case = cases.Cylinder(resolution=10)
-    figure = drawn(Config(case, RunSettings(probes="6,0.5; 8,0")))
+    figure = plotting.start(case, points=Config(case, RunSettings(probes="6,0.5; 8,0")).probes)
     points = [line.get_xydata().tolist() for line in figure.axes[0].lines if line.get_marker() == "+"]
     assert points == [[[6, 0.5], [8, 0]]]
 

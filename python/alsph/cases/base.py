@@ -251,10 +251,9 @@ class Case(Discretised):
         ConfigError
             If the particles would not fit into the memory that is free.
         """
-        from alsph.config import Config
-        from alsph.running.describe import drawn
+        from alsph import plotting
 
-        return drawn(Config(self))
+        return plotting.start(self)
 
     def _warn_of_unused_velocities(self, state: dict[str, NDArray[Any]]) -> None:
         """Warn if solid particles have velocities that are not those of their body, which are the ones that hold."""

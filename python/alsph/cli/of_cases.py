@@ -43,11 +43,12 @@ def _describe(
         typer.Option(help="draw particles, outlines, sides and recorded points to this file", show_default="none"),
     ] = None,
 ) -> None:
-    from alsph.running.describe import describe, drawn, starting
+    from alsph.running.describe import describe, starting
 
     state = starting(given.config)
     if draw:
-        alsph.plotting.save(drawn(given.config, state), draw, dpi=DPI)
+        figure = alsph.plotting.start(given.config.case, state, given.config.probes)
+        alsph.plotting.save(figure, draw, dpi=DPI)
     say_table(describe(given.config, state, probe=probe))
 
 

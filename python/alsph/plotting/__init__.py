@@ -4,6 +4,7 @@ from alsph.plotting.animation import Film, animate
 from alsph.plotting.curves import Curve, convergence, gauges, panels, pressure_coefficient, probes, profile
 from alsph.plotting.histories import coefficients, forces, ledger, spectrum
 from alsph.plotting.pictures import FIELDS, extent_of, field, field_style, fields
+from alsph.plotting.setup import start
 from alsph.plotting.style import PALETTE, head, remark, rename, save
 
 __all__ = [
@@ -30,4 +31,5 @@ __all__ = [
     "rename",
     "save",
     "spectrum",
+    "start",
 ]

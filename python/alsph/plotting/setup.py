@@ -6,11 +6,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from alsph.arrays import AXES, FloatArray
+from alsph.cases import Bodies, Case, remarks
 from alsph.geometry.particles import Kind
-from alsph.plotting.style import PALETTE, blank
+from alsph.geometry.plane import Plane
+from alsph.plotting.style import PALETTE, blank, rename
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,6 +51,12 @@ LEAST = 0.4
 
 NEAR = 8.0
 """Half width of the picture of the thinnest part [Δx]."""
+
+CHANGED = 1e-3
+"""Share of a body's area that must be cut off or filled for its outline as it was given to be drawn, too."""
+
+State = dict[str, NDArray[Any]]
+"""Particles."""
 
 View = tuple[float, float, float, float]
 """Left, right, bottom and top [D]."""
@@ -99,18 +108,106 @@ class Setup:
         return float(left), float(right), float(bottom), float(top)
 
 
-def setup(found: Setup, title: str = "") -> Figure:
-    """Picture of the start of a run: all of it, the bodies, and their thinnest part.
+def start(case: Case, state: State | None = None, points: FloatArray | None = None) -> Figure:
+    """Picture of what a run starts with: particles, outlines, the thinnest part, sides and recorded points.
+
+    In 3-D it is of the slice that pictures of the run show.
 
     Parameters
     ----------
-    found : Setup
-    title : str
-        What stands above it.
+    case : Case
+    state : dict of ndarray, optional
+        Its particles at the start, if they have been made already.
+    points : ndarray, shape (m, d), optional
+        Points that are recorded [D].
+
+    Raises
+    ------
+    ConfigError
+        If the particles would not fit into the memory that is free.
     """
+    plane, where = (0, 1), ""
+    if case.space_dimensions == 3:
+        cut = Plane.of(case.picture_axis, case.middle)
+        plane, where = (cut.across[0], cut.across[1]), f", ${AXES[cut.axis]}/D$ = {cut.place:.3g}"
+    figure = _draw_all(
+        _found(case, state or case.build().state, points, plane),
+        f"{case.name}, Re = {case.reynolds:g}, D/Δx = {case.resolution}{where}",
+    )
+    rename(figure, case.symbols)
+    return figure
+
+
+def _found(case: Case, state: State, points: FloatArray | None, plane: tuple[int, int]) -> Setup:
+    """Return what is drawn of the start of a case, in 3-D of particles within Δx of a plane through its middle."""
+    for axis in set(range(case.space_dimensions)) - set(plane):
+        near = np.abs(state["position"][:, axis] - case.middle[axis]) <= case.particle_spacing
+        state = {name: values[near] for name, values in state.items()}
+    view = _extent(case, state, plane)
+    return Setup(
+        case.checked_domain,
+        case.particle_spacing,
+        state["position"],
+        state["normal"],
+        state["kind"],
+        given=_given(case) if isinstance(case, Bodies) else [],
+        surface=_surface(case, view, plane) if view else [],
+        bodies=view,
+        thinnest=_thinnest(case) if isinstance(case, Bodies) else None,
+        points=points,
+        plane=plane,
+    )
+
+
+def _extent(case: Case, state: State, plane: tuple[int, int]) -> View | None:
+    """Return what the bodies that forces are those of extend over; None if there are none."""
+    named = [index for index, body in enumerate(case.checked_bodies) if body.name in case.coefficient_bodies]
+    solid = state["position"][(state["kind"] == Kind.SOLID) & np.isin(state["body"], named)][:, plane]
+    if not len(solid):
+        return None
+    (left, bottom), (right, top) = solid.min(axis=0), solid.max(axis=0)
+    return float(left), float(right), float(bottom), float(top)
+
+
+def _surface(case: Case, view: View, plane: tuple[int, int]) -> list[FloatArray]:
+    """Return the curves (n, 2) on which bodies end, as far as the case says."""
+    from contourpy import contour_generator
+
+    spacing = case.particle_spacing
+    x, y = (np.arange(low - 2 * spacing, high + 2 * spacing, spacing / 8) for low, high in (view[:2], view[2:]))
+    points = np.tile(case.middle, (len(x) * len(y), 1))
+    points[:, plane] = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    height = case.solid_height(points)
+    if height is None:
+        return []
+    height = np.clip(height, -spacing, spacing).reshape(len(y), len(x))
+    return [np.asarray(curve) for curve in contour_generator(x, y, height).lines(0.0)]
+
+
+def _given(case: Bodies) -> list[FloatArray]:
+    """Return the curves (n, 2) of outlines of which something is cut off or filled."""
+    parts = zip(case.outlines, case.carried, strict=True)
+    changed = [outline for outline, left in parts if outline.symmetric_difference(left).area > CHANGED * outline.area]
+    rings = [ring for outline in changed for ring in (outline.exterior, *outline.interiors)]
+    return [np.array(ring.coords) + case.centre for ring in rings]
+
+
+def _thinnest(case: Bodies) -> tuple[FloatArray, str] | None:
+    """Return where (2,) what is carried of the thinnest part ends, and what it is called; None if it is thick."""
+    spacing = case.particle_spacing
+    thickness = remarks.thinnest(case.outline) / spacing
+    if thickness > 0.99 * remarks.THICK:
+        return None
+    tip = shapely.Point(remarks.thinnest_tip(case.outline, spacing))
+    there = shapely.shortest_line(shapely.union_all(case.carried), tip).coords[0]
+    return np.array(there) + case.centre, f"thinnest part: {f'{thickness:.3g} Δx' if thickness > 0.01 else 'an edge'}"
+
+
+def _draw_all(found: Setup, title: str) -> Figure:
+    """Draw all of it, the bodies and their thinnest part."""
     views = [("", found.view)]
     if found.bodies:
-        views.append(("bodies", _around(found)))
+        views.append(("bodies", _around(found, found.bodies)))
     if found.thinnest:
         (x, y), name = found.thinnest
         reach = NEAR * found.spacing
@@ -139,9 +236,9 @@ def _height(aspect: float, views: int) -> float:
     return float(np.clip(WIDTH / views / aspect + 1.2, 2.6, 9))
 
 
-def _around(found: Setup) -> View:
+def _around(found: Setup, bodies: View) -> View:
     """Return a view of the bodies with some room around them, no larger than the whole."""
-    corners = np.reshape(found.bodies, (2, 2)).T
+    corners = np.reshape(bodies, (2, 2)).T
     outlines = np.concatenate([corners, *found.given, *found.surface])
     low, high = outlines.min(axis=0), outlines.max(axis=0)
     size = (high - low).max()
@@ -173,9 +270,9 @@ def _draw(axes: Axes, found: Setup, view: View, *, close: bool) -> None:
         normal = found.normal[solid][:, across] * found.spacing / 2
         style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.002, "headwidth": 0}
         axes.quiver(*place[solid].T, *normal.T, headlength=0, headaxislength=0, color="w", **style)
-    for curves, look in ((found.given, {"color": PALETTE[1], "ls": "--"}), (found.surface, {"color": "k"})):
+    for curves, colour, dashes in ((found.given, PALETTE[1], "--"), (found.surface, "k", "-")):
         for curve in curves:
-            axes.plot(*np.append(curve, curve[:1], axis=0).T, lw=1.2 if close else 0.6, **look)
+            axes.plot(*curve.T, color=colour, ls=dashes, lw=1.2 if close else 0.6)
     if found.points is not None and len(found.points):
         axes.plot(*found.points[:, across].T, "+", color=PALETTE[3], ms=6)
     if close and found.thinnest:
@@ -199,7 +296,9 @@ def _name_sides(axes: Axes, found: Setup) -> None:
         for corner, side, inwards in ((low, sides[0], 1), (high, sides[1], -1)):
             at, offset = middle.copy(), np.zeros(2)
             at[axis], offset[axis] = corner[axis], inwards * BESIDE
-            axes.annotate(CLOSED_BY[side], at, offset, rotation=90 if axis == 0 else 0, **look)
+            axes.annotate(
+                CLOSED_BY[side], (at[0], at[1]), (offset[0], offset[1]), rotation=90 if axis == 0 else 0, **look
+            )
 
 
 def _explain(figure: Figure, found: Setup) -> None:

@@ -4,33 +4,21 @@ from __future__ import annotations
 
 import math
 import time as clock
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
-from alsph import plotting
-from alsph.arrays import AXES, FloatArray
-from alsph.cases import Bodies, Body, Body3D, Case, remarks
+from alsph.cases import Body, Body3D
 from alsph.config import Config
 from alsph.engine.simulation import Simulation
 from alsph.errors import SolverError
 from alsph.geometry.particles import Kind
-from alsph.geometry.plane import Plane
-from alsph.plotting.setup import Setup, View, setup
 from alsph.running.outputs import PLANE_INTERVAL, remarks_of
 from alsph.text import duration
 from alsph.units import Units
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 PROBE_SECONDS = 5.0
-
-CHANGED = 1e-3
-"""Share of a body's area that must be cut off or filled for its outline as it was given to be drawn, too."""
-
 
 State = dict[str, NDArray[Any]]
 
@@ -114,90 +102,6 @@ def describe(config: Config, state: State | None = None, *, probe: bool = True) 
         lines.append(("warning", warning))
     lines += [("remark", remark) for remark in remarks_of(config, state)]
     return [(case.symbols(name), case.symbols(text)) for name, text in lines]
-
-
-def drawn(config: Config, state: State | None = None) -> Figure:
-    """Return a picture of what a run starts with: particles, outlines, the thinnest part, sides and recorded points.
-
-    In 3-D it is of the slice that pictures of the run show.
-
-    Parameters
-    ----------
-    config
-        The case and the settings of its run.
-    state
-        Its particles at the start, if they have been made already.
-
-    Raises
-    ------
-    ConfigError
-        If the particles would not fit into the memory that is free.
-    """
-    case, spacing = config.case, config.case.particle_spacing
-    state = state or starting(config)
-    plane, where = (0, 1), ""
-    if case.space_dimensions == 3:
-        cut = Plane.of(case.picture_axis, case.middle)
-        near = np.abs(state["position"][:, cut.axis] - cut.place) <= spacing  # a layer on each side
-        state = {name: values[near] for name, values in state.items()}
-        plane, where = (cut.across[0], cut.across[1]), f", ${AXES[cut.axis]}/D$ = {cut.place:.3g}"
-    view = _extent(case, state, plane)
-    start = Setup(
-        case.checked_domain,
-        spacing,
-        state["position"],
-        state["normal"],
-        state["kind"],
-        surface=_surface(case, view, plane) if view else [],
-        bodies=view,
-        points=config.probes,
-        plane=plane,
-        **(_given(case) if isinstance(case, Bodies) else {}),
-    )
-    figure = setup(start, f"{case.name}, Re = {case.reynolds:g}, D/Δx = {case.resolution}{where}")
-    plotting.rename(figure, case.symbols)
-    return figure
-
-
-def _extent(case: Case, state: State, plane: tuple[int, int]) -> View | None:
-    """Return what the bodies that forces are those of extend over; None if there are none."""
-    named = [index for index, body in enumerate(case.checked_bodies) if body.name in case.coefficient_bodies]
-    solid = state["position"][(state["kind"] == Kind.SOLID) & np.isin(state["body"], named)][:, plane]
-    if not len(solid):
-        return None
-    (left, bottom), (right, top) = solid.min(axis=0), solid.max(axis=0)
-    return float(left), float(right), float(bottom), float(top)
-
-
-def _surface(case: Case, view: View, plane: tuple[int, int]) -> list[FloatArray]:
-    """Return the curves (n, 2) on which bodies end, as far as the case says."""
-    from contourpy import contour_generator
-
-    spacing = case.particle_spacing
-    x, y = (np.arange(low - 2 * spacing, high + 2 * spacing, spacing / 8) for low, high in (view[:2], view[2:]))
-    points = np.tile(case.middle, (len(x) * len(y), 1))
-    points[:, plane] = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    height = case.solid_height(points)
-    if height is None:
-        return []
-    height = np.clip(height, -spacing, spacing).reshape(len(y), len(x))
-    return [np.asarray(curve) for curve in contour_generator(x, y, height).lines(0.0)]
-
-
-def _given(case: Bodies) -> dict[str, Any]:
-    """Return the outlines of which something is cut off or filled, and where what is carried of a thin part ends."""
-    spacing = case.particle_spacing
-    parts = zip(case.outlines, case.carried, strict=True)
-    changed = [outline for outline, left in parts if outline.symmetric_difference(left).area > CHANGED * outline.area]
-    rings = [ring for outline in changed for ring in (outline.exterior, *outline.interiors)]
-    thickness = remarks.thinnest(case.outline) / spacing
-    thinnest = None
-    if thickness < 0.99 * remarks.THICK:
-        name = f"thinnest part: {thickness:.3g} Δx" if thickness > 0.01 else "thinnest part: an edge"
-        tip = shapely.Point(remarks.thinnest_tip(case.outline, spacing))
-        there = shapely.shortest_line(shapely.union_all(case.carried), tip).coords[0]
-        thinnest = np.array(there) + case.centre, name
-    return {"given": [np.array(ring.coords) + case.centre for ring in rings], "thinnest": thinnest}
 
 
 def _in_si(units: Units, step: float, until: float) -> list[tuple[str, str]]:
