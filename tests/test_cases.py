@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 from alsph import _alsph
-from alsph.cases import CASES, Body, Cylinder, FreeSurface, TaylorGreen
+from alsph.cases import CASES, Body, Cylinder, FreeSurface, Sphere, TaylorGreen
 from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind
 from alsph.geometry.solids import cylinder_rings
@@ -225,3 +225,73 @@ def test_a_case_is_shown_in_short_by_what_is_not_as_by_default():
     case = Cylinder(reynolds=100, time_step=0.01)
     assert eval(repr(case), {"Cylinder": Cylinder}) == case
     assert not {"model_dump", "model_fields", "copy", "dict"} & {*dir(case)} and "reynolds" in dir(case)
+
+
+CONFINED = {"length": 6.0, "height": 4.0, "upstream": 2.0, "resolution": 10, "sides": "no_slip"}
+
+
+@pytest.mark.parametrize(
+    "case", [Cylinder(**CONFINED), Cylinder(**CONFINED, offset=-0.25), Body(**CONFINED, offset=0.3)], ids=str
+)
+def test_between_no_slip_sides_the_inflow_is_a_parabola_of_mean_u(case):
+    state, kind = case.particles(), case.particles()["kind"]
+    inlet = state["position"][kind == Kind.INLET]
+    y, u = inlet[:, 1], state["velocity"][kind == Kind.INLET]
+    assert u[:, 0] == pytest.approx(1.5 * (1 - (y / 2) ** 2)) and not u[:, 1].any()
+    assert u[:, 0].mean() == pytest.approx(1, rel=1e-3)
+    sides = (kind == Kind.SOLID) & (state["body"] == 1)
+    place, normal, depth = (state[name][sides] for name in ("position", "normal", "depth"))
+    assert np.abs(place[:, 1]) - 2 == pytest.approx(depth) and depth.min() == pytest.approx(0.05)
+    assert (normal[:, 1] == -np.sign(place[:, 1])).all() and not normal[:, 0].any()
+    beyond = case.buffer_columns * case.particle_spacing
+    assert place[:, 0].min() < -beyond and place[:, 0].max() > case.length + beyond
+    assert [body.name for body in case.bodies()] == [*case.coefficient_bodies, "sides"]
+    assert case.sliding_bodies == case.moved_bodies == case.coefficient_bodies
+    solid = state["position"][(kind == Kind.SOLID) & (state["body"] == 0)]
+    middle = (solid.min(axis=0) + solid.max(axis=0)) / 2
+    assert middle == pytest.approx([2.0, case.offset], abs=0.02)
+    assert abs(case.particle_estimate() / len(kind) - 1) < 0.05
+
+
+def test_slip_sides_are_as_they_were():
+    case = Cylinder(resolution=10)
+    state, kind = case.particles(), case.particles()["kind"]
+    x, y = ((state["position"][kind == Kind.FLUID] - [4, 0]) / 0.6).T
+    swirl = 0.1 * np.exp(0.5 * (1 - x**2 - y**2))
+    assert (state["velocity"][kind == Kind.FLUID] == np.stack([1 - swirl * y, swirl * x], axis=1)).all()
+    assert (state["velocity"][kind == Kind.INLET] == [1, 0]).all() and len(case.bodies()) == 1
+
+
+def test_surfaces_that_slide_are_the_bodys_not_the_sides():
+    case = Cylinder(**CONFINED, surface_velocity="-2*y, 2*(x - upstream)", perturbation=0.0)
+    simulation = case.simulation(threads=1)
+    simulation.advance(1)
+    state = simulation.state()
+    solid = state["kind"] == Kind.SOLID
+    x, y = (state["position"] - case.centre).T
+    of_sides = solid & (state["body"] == 1)
+    of_body = solid & (state["body"] == 0)
+    assert (
+        np.abs(state["velocity"][of_body]).max() > 0.5
+        and not np.asarray(case.settings()["bodies"][1]["velocity"]).any()
+    )
+    flow = Cylinder(**CONFINED, perturbation=0.0).simulation(threads=1)
+    flow.advance(1)
+    assert (state["velocity"][of_sides] == flow.state()["velocity"][of_sides]).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"offset": 1.2}, "height = 4: the cylinder does not fit"),
+        ({"height": 4.15}, "height"),
+    ],
+)
+def test_an_offset_that_leaves_no_room(changes, message):
+    with pytest.raises(ConfigError, match=message):
+        Cylinder(**(CONFINED | changes))
+
+
+def test_a_quarter_has_no_offset():
+    with pytest.raises(ConfigError, match="not with offset"):
+        Sphere(quarter=True, offset=0.1)

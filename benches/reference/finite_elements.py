@@ -16,17 +16,25 @@ HOLD = 16
 """The step may be doubled when this many of it have been taken."""
 
 
-def past_cylinder(channel: tuple[float, float, float], wake: tuple[float, float], size: float, curve: int) -> ng.Mesh:
-    """Return the mesh of a channel (length, height, upstream) [D] around a cylinder.
+def past_cylinder(
+    channel: tuple[float, float, float],
+    wake: tuple[float, float],
+    size: float,
+    curve: int,
+    offset: float = 0.0,
+    sides: str = "side",
+) -> ng.Mesh:
+    """Return the mesh of a channel (length, height, upstream) [D] around a cylinder, whose centre has y = 0.
 
     From 1 D before its centre to the outlet, from a height `wake[0]` on and `wake[1]` high [D], elements have a `size`
-    [D]; they are of the order `curve` at the cylinder.
+    [D]; they are of the order `curve` at the cylinder. The centre lies `offset` above the channel's; `sides` is what
+    its sides are called, "inlet" where they do not let slip, as the inflow vanishes there.
     """
     length, height, upstream = channel
-    whole = occ.MoveTo(0, -height / 2).Rectangle(length, height).Face()
+    whole = occ.MoveTo(0, -height / 2 - offset).Rectangle(length, height).Face()
     for edge in whole.edges:
         at = edge.center.x
-        edge.name = "inlet" if abs(at) < 1e-6 else "outlet" if abs(at - length) < 1e-6 else "side"
+        edge.name = "inlet" if abs(at) < 1e-6 else "outlet" if abs(at - length) < 1e-6 else sides
     behind = occ.MoveTo(upstream - 1, wake[0]).Rectangle(length - upstream + 1, wake[1]).Face()
     near, disc = (occ.Circle((upstream, 0), radius).Face() for radius in (1.0, 0.5))
     behind.faces.maxh, near.faces.maxh = size, 0.13

@@ -24,6 +24,7 @@ from alsph.cases.body_3d import Body3D
 from alsph.cases.cavity import Cavity
 from alsph.cases.channel import Channel
 from alsph.cases.concentric_release import ConcentricRelease
+from alsph.cases.confined_cylinder import ConfinedCylinder
 from alsph.cases.couette import Couette
 from alsph.cases.cylinder import Cylinder
 from alsph.cases.cylinder_pair import CylinderPair
@@ -60,7 +61,7 @@ from alsph.parameters import suggest
 CASES: dict[str, type[Case]] = {
     case.name: case
     for case in (
-        *(Cylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Nozzle, Bend, Cavity),
+        *(Cylinder, ConfinedCylinder, CylinderPair, Body, Sphere, Body3D, BackwardFacingStep, Nozzle, Bend, Cavity),
         *(Poiseuille, Couette, TaylorCouette, PulsatingChannel, Pipe, PressureJump, TaylorGreen),
         *(RotatingCylinder, OscillatingCylinder, TowedCylinder, ConcentricRelease, SettlingSphere),
         *(
@@ -90,6 +91,7 @@ __all__ = [
     "Cavity",
     "Channel",
     "ConcentricRelease",
+    "ConfinedCylinder",
     "Couette",
     "DamBreak",
     "DamBreakObstacle",

@@ -39,7 +39,7 @@ class Bodies(Channel):
     def shapes(self) -> list[Any]:
         """Return the outline of each body, an array of points (n, 2) or a polygon of shapely.
 
-        Lengths are in D, and the origin is the point (upstream, 0) of the channel.
+        Lengths are in D, and the origin is the point (upstream, offset) of the channel.
         """
 
     @cached_property
@@ -54,9 +54,8 @@ class Bodies(Channel):
     @model_validator(mode="after")
     def _fits_in(self) -> Self:
         left, bottom, right, top = self.outline.bounds
-        room = min(
-            self.upstream + left, self.length - self.upstream - right, bottom + self.height / 2, self.height / 2 - top
-        )
+        below, above = self.height / 2 + self.offset, self.height / 2 - self.offset
+        room = min(self.upstream + left, self.length - self.upstream - right, bottom + below, above - top)
         if room < 0.5:
             one = len(self.outlines) == 1
             what, come = ("the body", "comes") if one else ("the bodies together", "come")
@@ -128,7 +127,7 @@ class Bodies(Channel):
     def solid_height(self, position: FloatArray) -> FloatArray:
         """Return how far points (n, 2) lie outside of the bodies as carried [D]."""
         bodies = Planar(shapely.union_all(self._sampled))
-        return height_over(bodies, position - self.centre, self.particle_spacing)
+        return self._within_sides(height_over(bodies, position - self.centre, self.particle_spacing), position)
 
     def _initial_velocity(self, position: FloatArray) -> FloatArray:
         """Return the velocity (n, 2) at the start: none in holes."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,20 +15,28 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.base import Case
+from alsph.cases.duct import parabola
 from alsph.geometry.domain import Boundary, Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, lattice, symmetric_centres
 from alsph.geometry.particles import Kind, join, particles
 from alsph.geometry.solids import Solid
 from alsph.reference import Reference
 
+SIDES = "sides"
+"""Name of the sides that do not let slip, among the bodies."""
+
+ROUND = 1.5
+"""Largest velocity over that of the inflow where it goes round a body."""
+
 
 class Channel(Case):
     """Flow past a body in a channel with free-slip walls and uniform inflow U.
 
-    The inlet lies at x = 0 and the centre line at y = 0; lengths are in D, velocities in U.
+    The inlet lies at x = 0 and the centre line at y = 0; lengths are in D, velocities in U. With no-slip sides the
+    inflow is the parabola of developed flow, and U its mean.
     """
 
-    velocity_max: ClassVar[float] = 1.5
+    velocity_max: ClassVar[float] = ROUND
     of_the_start: ClassVar[tuple[str, ...]] = ("perturbation",)
     body_name: ClassVar[str]
     across: ClassVar[tuple[str, ...]] = ("height",)
@@ -39,6 +47,11 @@ class Channel(Case):
     length: float = Field(default=14.0, gt=0, description="length of the channel [D]")
     height: float = Field(default=13.0, gt=0, description="height of the channel [D]")
     upstream: float = Field(default=4.0, gt=0, description="distance from the inlet to the centre of the body [D]")
+    offset: float = Field(default=0.0, description="how far the centre of the body lies above the centre line [D]")
+    sides: Literal["slip", "no_slip"] = Field(
+        default="slip",
+        description="sides of the channel: with slip and a uniform inflow U, or without and the parabola of mean U",
+    )
     perturbation: float = Field(
         default=0.1,
         ge=0,
@@ -56,9 +69,12 @@ class Channel(Case):
     @model_validator(mode="after")
     def _fits(self) -> Self:
         room = {name: getattr(self, name) / 2 for name in self.across}
+        room["height"] -= abs(self.offset)
         for name, left in (room | {"upstream": self.upstream, "length": self.length - self.upstream}).items():
             if left < 1:
-                known = ", ".join(f"{each} {getattr(self, each):g}" for each in ("length", *self.across, "upstream"))
+                known = ", ".join(
+                    f"{each} {getattr(self, each):g}" for each in ("length", *self.across, "upstream", "offset")
+                )
                 raise ValueError(
                     f"{name} = {getattr(self, name):g}: the {self.body_name} does not fit; leave at least 1 D from "
                     f"centre to each side ({known})"
@@ -66,6 +82,11 @@ class Channel(Case):
         for name in ("length", *self.across):
             self.whole_cells(name, getattr(self, name))
         return self
+
+    @property
+    def expected_velocity(self) -> float:
+        """Largest velocity that is expected [U]: the parabola's is half as much again as its mean."""
+        return self.velocity_max * (1.5 if self.sides == "no_slip" else 1.0)
 
     @property
     def section(self) -> FloatArray:
@@ -103,7 +124,8 @@ class Channel(Case):
     def remarks(self) -> list[str]:
         """Return what is to be said of the resolution, the method and the channel."""
         behind = self.length - self.upstream - self.bounds[2]
-        return [*super().remarks(), *remarks.channel(self.blocked, self.upstream, behind, self.blockage, self.slowed)]
+        slowed = self.slowed if self.sides == "slip" else 0.0  # the benchmarks with a parabola have their inlet near
+        return [*super().remarks(), *remarks.channel(self.blocked, self.upstream, behind, self.blockage, slowed)]
 
     @property
     def blocked(self) -> float:
@@ -129,17 +151,24 @@ class Channel(Case):
     @property
     def centre(self) -> FloatArray:
         """Centre of the body (d,) [D]."""
-        return np.array([self.upstream, *0 * self.section])
+        return np.array([self.upstream, self.offset, *0 * self.section[1:]])
 
     def domain(self) -> Domain:
-        """Return the channel: inlet at x = 0, outlet at x = length, free-slip walls at y = ± height/2 and z alike."""
+        """Return the channel: inlet at x = 0, outlet at x = length, its sides at y = ± height/2 and z alike."""
         half = self.section / 2
-        walls: list[tuple[Boundary, Boundary]] = [("slip", "slip")] * len(half)
+        side: Boundary = "slip" if self.sides == "slip" else "none"
+        walls: list[tuple[Boundary, Boundary]] = [(side, side)] * len(half)
         return Domain((0, *-half), (self.length, *half), [("inlet", "outlet"), *walls])
 
     def bodies(self) -> list[SolidBody]:
-        """Return the bodies, at rest; their torques are about the centre."""
-        return [SolidBody(name, tuple(self.centre)) for name in self.coefficient_bodies]
+        """Return the bodies and sides that do not let slip, at rest; their torques are about the centre."""
+        names = [*self.coefficient_bodies, *([SIDES] if self.sides == "no_slip" else [])]
+        return [SolidBody(name, tuple(self.centre)) for name in names]
+
+    @property
+    def sliding_bodies(self) -> list[str]:
+        """Names of the bodies whose surface may slide: those in place, without the sides."""
+        return [name for name in super().sliding_bodies if name != SIDES]
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a uniform lattice around the body's solid particles, impulsively started."""
@@ -147,14 +176,39 @@ class Channel(Case):
         rows = [symmetric_centres(self.whole_cells(name, getattr(self, name)), spacing) for name in self.across]
         buffer = cell_centres(self.buffer_columns, spacing)
         channel = lattice(cell_centres(self.whole_cells("length", self.length), spacing), *rows)
-        stream = np.eye(self.space_dimensions)[0]
-        fluid = self.fluid(channel)
+        before, behind = lattice(-buffer, *rows), lattice(self.length + buffer, *rows)
+        fluid, solids = self.fluid(channel), [solid.moved(self.centre) for solid in self.solids()]
         return join(
             particles(Kind.FLUID, fluid, self._initial_velocity(fluid)),
-            particles(Kind.INLET, lattice(-buffer, *rows), stream),
-            particles(Kind.OUTLET, lattice(self.length + buffer, *rows), stream),
-            *(solid.moved(self.centre).particles(body=index) for index, solid in enumerate(self.solids())),
+            particles(Kind.INLET, before, self._stream(before)),
+            particles(Kind.OUTLET, behind, self._stream(behind)),
+            *(solid.particles(body=index) for index, solid in enumerate(solids)),
+            *(side.particles(body=len(solids)) for side in self._sides()),
         )
+
+    def _sides(self) -> list[Solid]:
+        """Return the layers of sides that do not let slip, which go on beyond the buffers; none of others."""
+        if self.sides == "slip":
+            return []
+        spacing = self.particle_spacing
+        beyond = self.buffer_columns + self.support_layers
+        x = cell_centres(self.whole_cells("length", self.length) + 2 * beyond, spacing) - beyond * spacing
+        place = lattice(x, cell_centres(self.support_layers, spacing))
+        inwards = np.broadcast_to([0.0, -1.0], place.shape).copy()
+        upper = Solid(place + [0.0, self.height / 2], inwards, place[:, 1].copy())
+        return [upper, upper.mirrored()]
+
+    def _stream(self, position: FloatArray) -> FloatArray:
+        """Return the undisturbed flow at positions (n, d): U, or the parabola of that mean."""
+        if self.sides == "no_slip":
+            return parabola(0.5 + position[:, 1] / self.height, np.ones(len(position)))
+        return np.broadcast_to(np.eye(self.space_dimensions)[0], position.shape)
+
+    def _within_sides(self, height: FloatArray, position: FloatArray) -> FloatArray:
+        """Return how far points (n, d) lie outside of bodies, given it (n,), and of sides that do not let slip [D]."""
+        if self.sides == "slip":
+            return height
+        return np.asarray(np.minimum(height, self.height / 2 - np.abs(position[:, 1])))
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces on the body and the Strouhal number."""
@@ -177,7 +231,8 @@ class Channel(Case):
         return None
 
     def _initial_velocity(self, position: FloatArray) -> FloatArray:
-        """Uniform flow and a Gaussian vortex (divergence-free) about the body, fastest 0.6 D from its centre."""
+        """Return the stream and a Gaussian vortex (divergence-free) about the body, fastest 0.6 D from its centre."""
         x, y, *z = ((position - self.centre) / 0.6).T
         swirl = self.perturbation * np.exp(0.5 * (1 - x**2 - y**2 - sum(each**2 for each in z)))
-        return np.stack([1.0 - swirl * y, swirl * x, *(0 * each for each in z)], axis=1)
+        about = np.stack([-swirl * y, swirl * x, *(0 * each for each in z)], axis=1)
+        return np.asarray(self._stream(position) + about)

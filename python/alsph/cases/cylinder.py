@@ -54,7 +54,7 @@ class Cylinder(Channel):
 
     def solid_height(self, position: FloatArray) -> FloatArray:
         """Return how far points (n, 2) lie outside of the cylinder [D]."""
-        return np.asarray(np.hypot(*(position - self.centre).T) - RADIUS)
+        return self._within_sides(np.hypot(*(position - self.centre).T) - RADIUS, position)
 
     def surface_points(self) -> Surface:
         """Return 72 points on the cylinder, every 5 degrees from the front stagnation point over the upper side."""

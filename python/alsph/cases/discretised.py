@@ -69,14 +69,19 @@ class Discretised(Driven):
         if body.moves and body.velocity is None and not body.rigid:
             told = "give it a velocity, make it rigid, or say how it moves by `motion` or `body_motion`"
             raise ConfigError(f"{self.name}: body '{body.name}' moves, and nothing says how; {told}")
-        return {"velocity": None} if "sliding" in self.rules and not body.moves else {}
+        return {"velocity": None} if "sliding" in self.rules and body.name in self.sliding_bodies else {}
+
+    @property
+    def expected_velocity(self) -> float:
+        """Largest velocity that is expected [U]."""
+        return self.velocity_max
 
     @property
     def largest_time_step(self) -> float:
         """Upper bound of the time step, which all steps have that are not adaptive [Δx/U]."""
         if self.time_step or not self.courant:
             return self.time_step or math.nan
-        return self.courant / (1.0 if self.adaptive_time_step else self.velocity_max)
+        return self.courant / (1.0 if self.adaptive_time_step else self.expected_velocity)
 
     def memory(self) -> float:
         """Return the estimated peak memory of a simulation [bytes]."""
@@ -88,7 +93,7 @@ class Discretised(Driven):
         ``courant`` is the one asked for, ``penalty``, ``acoustic``, ``viscous`` and ``body_force`` are limits of
         stability.
         """
-        limits = time_step_limits(self.settings(), self.velocity_max)
+        limits = time_step_limits(self.settings(), self.expected_velocity)
         names = ("courant", "penalty", "acoustic", "viscous", "body_force")
         return {name: limits[name] / self.particle_spacing for name in names}
 
@@ -111,11 +116,11 @@ class Discretised(Driven):
             share = self.expected_time_step() / self.time_step_limits()["acoustic"]
             return float((share * self.settings()["scheme"]["mach_number"]) ** -2)
         if self.is_weakly_compressible:
-            return float((self.settings()["scheme"]["sound_speed"] / self.velocity_max) ** 2)
+            return float((self.settings()["scheme"]["sound_speed"] / self.expected_velocity) ** 2)
         if self.penalty_constant is not None:
             return self.penalty_constant
-        largest = time_step_limits(self.settings(), self.velocity_max)["lambda_max"]
-        return (self.expected_time_step() * self.velocity_max) ** -2 / largest
+        largest = time_step_limits(self.settings(), self.expected_velocity)["lambda_max"]
+        return (self.expected_time_step() * self.expected_velocity) ** -2 / largest
 
     def time_step_warning(self) -> str | None:
         """Return a warning if steps are to be taken above the stability law, which it names."""
@@ -127,7 +132,7 @@ class Discretised(Driven):
         law = "courant limit" if binding == "courant" else f"{binding.replace('_', ' ')} stability limit"
         return self.symbols(
             f"time_step = {step:.4g} lies above the {law} "
-            f"{limits[binding]:.4g} (ΔtU/Δx at u_max = {self.velocity_max:g} U); "
+            f"{limits[binding]:.4g} (ΔtU/Δx at u_max = {self.expected_velocity:g} U); "
             "expect divergence: lower time_step or switch adaptive_time_step on"
         )
 

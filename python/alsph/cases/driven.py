@@ -65,7 +65,7 @@ class Driven(Dimensional):
             raise ConfigError(f"inlet_velocity = {shown(self.inlet_velocity)}: {self.name} has no inlet")
         if self.body_motion is not None and not self.moved_bodies:
             raise ConfigError(f"body_motion = {shown(self.body_motion)}: {self.name} has no body to move")
-        if self.surface_velocity is not None and all(body.moves for body in self.checked_bodies):
+        if self.surface_velocity is not None and not self.sliding_bodies:
             raise ConfigError(f"surface_velocity = {shown(self.surface_velocity)}: {self.name} has no body in place")
         return self
 
@@ -102,6 +102,11 @@ class Driven(Dimensional):
         told = [body.name for body in self.checked_bodies if body.moves and body.velocity is None and not body.rigid]
         free = {body.name for body in self.checked_bodies if body.rigid}
         return told or [name for name in self.coefficient_bodies if name not in free]
+
+    @property
+    def sliding_bodies(self) -> list[str]:
+        """Names of the bodies whose surface :meth:`sliding` moves: those in place."""
+        return [body.name for body in self.checked_bodies if not body.moves]
 
     @property
     def moved_centres(self) -> FloatArray:

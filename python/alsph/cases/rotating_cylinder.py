@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,6 +42,7 @@ class RotatingCylinder(Cylinder):
     perturbation: float = Field(
         default=0.0, ge=0, le=1, description="largest velocity of an initial vortex about the body [U]"
     )
+    sides: Literal["slip"] = Field(default="slip", description="sides of the channel: with slip and a uniform inflow U")
     surface_speed: float = Field(
         default=1.0, ge=-4, le=4, description="speed of the surface, counterclockwise where positive [U]"
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,7 @@ class Spatial(Channel):
         le=1,
         description="largest velocity of an initial vortex about the body that starts shedding; 0: symmetric [U]",
     )
+    sides: Literal["slip"] = Field(default="slip", description="sides of the channel: with slip and a uniform inflow U")
     quarter: bool = Field(
         default=False,
         description="compute a quarter of the flow, y and z above 0, for flows that are symmetric in both; forces are "
@@ -64,6 +65,8 @@ class Spatial(Channel):
     def _is_symmetric(self) -> Self:
         if self.quarter and len(self._volume.flips) < 2:
             raise ValueError(f"quarter = true: the {self.body_name} is not its own mirror image in y and in z")
+        if self.quarter and self.offset:
+            raise ValueError(f"quarter = true: not with offset = {self.offset:g}, which leaves the flow no symmetry")
         return self
 
     @cached_property

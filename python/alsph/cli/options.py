@@ -136,7 +136,7 @@ def _without_effect(case: cases.Case) -> set[str]:
         "wall_velocity": bodies,
         "wall_pressure": bodies,
         "body_motion": case.moved_bodies,
-        "surface_velocity": [body for body in bodies if not body.moves],
+        "surface_velocity": case.sliding_bodies,
         "inlet_velocity": [*domain.inlets()],
         "surface_interval": case.surface_points(),
         "initial_run": not domain.meets_air,

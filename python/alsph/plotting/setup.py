@@ -37,6 +37,9 @@ CLOSED_BY = {
 WIDTH = 11.0
 """Width of the figure in inches."""
 
+TALLEST = 5.0
+"""Largest height of what is drawn below the whole, in inches."""
+
 LONG = 2.2
 """Length over height of a domain from which its bodies are drawn below it, not beside it."""
 
@@ -232,7 +235,7 @@ def _draw_all(found: Setup, title: str) -> Figure:
 def _height(aspect: float, views: int) -> float:
     """Return the height of the figure in inches, given length over height of the domain."""
     if views > 1 and aspect > LONG:
-        return float(np.clip(WIDTH / aspect + WIDTH / (views - 1) + 1.5, 5, 12))
+        return float(np.clip(WIDTH / aspect + min(WIDTH / (views - 1), TALLEST) + 1.5, 5, 12))
     return float(np.clip(WIDTH / views / aspect + 1.2, 2.6, 9))
 
 

@@ -76,7 +76,9 @@ def describe(config: Config, state: State | None = None, *, probe: bool = True) 
         lines.append((name, f"C_BV = (c/u_max)² = {constant:.3g}: artificial Mach number {constant**-0.5:.2g}"))
     for name, limit in limits.items():
         if np.isfinite(limit):
-            text = f"ΔtU/Δx < {limit:.4g} at u_max = {case.velocity_max:g} U{' (binds)' if name == binding else ''}"
+            text = (
+                f"ΔtU/Δx < {limit:.4g} at u_max = {case.expected_velocity:g} U{' (binds)' if name == binding else ''}"
+            )
             lines.append((f"{name.replace('_', ' ')} limit", text))
     lines += _in_si(case.units, step * case.particle_spacing, config.until) if case.units else []
     if points := sum(math.prod(map(len, axes)) for axes in config.planes):

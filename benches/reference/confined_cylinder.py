@@ -1,0 +1,90 @@
+"""Loads on a cylinder between no-slip sides, by finite elements: the reference of the case `confined_cylinder`.
+
+The flows are the benchmarks 2D-1 (Re = 20, steady) and 2D-2 (Re = 100, shedding) of Schäfer and Turek, Notes Numer.
+Fluid Mech. 52 (1996) 547: a channel 22 D long and 4.1 D high, the cylinder 2 D behind the inlet and 0.05 D below the
+centre line. They found a largest drag coefficient of 3.22 to 3.24, a largest lift coefficient of 0.99 to 1.01 and a
+Strouhal number of 0.295 to 0.305 for 2D-2. A row of the table holds what velocities of order 4 have; the last columns
+say by how much order 3 and half the time step (with order 3) move drag and lift. Means of 2D-2 are those of the last
+periods before t* = 70.
+
+    python -m venv fem && fem/bin/pip install ngsolve .
+    fem/bin/python benches/reference/confined_cylinder.py -o cylinder_confined.csv
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from pathlib import Path
+
+import ngsolve as ng
+import numpy as np
+from finite_elements import Flow, past_cylinder
+
+CHANNEL, OFFSET = (22.0, 4.1, 2.0), -0.05  # length, height, upstream; the centre above the channel's [D]
+UNTIL, PERIODS, DOUBLINGS = 70.0, 8, 5
+STEP = 0.005  # [D/U]
+FOUND = ["CD_mean", "CDp", "CDf", "CL_mean", "CL_rms", "CL_amp", "St_fD_over_U", "CD_max", "CD_min", "CL_max", "CL_min"]
+COLUMNS = ["Re", "LU_over_D", "L_over_D", "H_over_D", "offset_over_D", *FOUND, "moved_by_order", "moved_by_step"]
+
+
+def flow(reynolds: float, order: int) -> Flow:
+    """Return the flow at rest between the sides, with the parabola of the mean U at the inlet."""
+    _, height, _ = CHANNEL
+    mesh = past_cylinder(CHANNEL, (-1.2, 2.4), 0.3, curve=6, offset=OFFSET, sides="inlet")
+    y = (ng.y + height / 2 + OFFSET) / height
+    return Flow(mesh, reynolds, order, (6 * y * (1 - y), 0))
+
+
+def steady(reynolds: float, order: int) -> np.ndarray:
+    """Return what is found of the steady flow."""
+    settled = flow(reynolds, order)
+    settled.settle()
+    drag, pressure, viscous, lift, *_ = settled.loads()
+    return np.array([drag, pressure, viscous, lift, abs(lift), 0, np.nan, drag, drag, lift, lift])
+
+
+def periodic(reynolds: float, order: int, step: float) -> np.ndarray:
+    """Return what is found of the last periods of the flow that sheds vortices."""
+    begun = flow(reynolds, order)
+    y = (ng.y + CHANNEL[1] / 2 + OFFSET) / CHANNEL[1]
+    begun.velocity.Set(ng.CoefficientFunction((6 * y * (1 - y), 0)))
+    history = np.array([(time, *begun.loads()[:4]) for time in begun.march(UNTIL, step, DOUBLINGS)]).T
+    time, drag, pressure, viscous, lift = (column[len(column) // 2 :] for column in history)
+    about = lift - lift.mean()
+    rises = np.flatnonzero((about[:-1] < 0) & (about[1:] >= 0))
+    crossings = time[rises] - about[rises] * (time[rises + 1] - time[rises]) / (about[rises + 1] - about[rises])
+    first, last = crossings[-1 - PERIODS], crossings[-1]
+    at = np.linspace(first, last, 8001)[:-1]
+    drag, pressure, viscous, lift = (np.interp(at, time, load) for load in (drag, pressure, viscous, lift))
+    amplitude = 2 * abs(np.mean(lift * np.exp(2j * np.pi * PERIODS * (at - first) / (last - first))))
+    means = [load.mean() for load in (drag, pressure, viscous, lift)]
+    ends = [drag.max(), drag.min(), lift.max(), lift.min()]
+    return np.array([*means, np.sqrt(np.mean(lift**2)), amplitude, PERIODS / (last - first), *ends])
+
+
+def main() -> None:
+    """Solve both flows, and write a row of the table for each."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=Path, default=Path("cylinder_confined.csv"), help="(%(default)s)")
+    options = parser.parse_args()
+    length, height, upstream = CHANNEL
+    of = [FOUND.index(name) for name in ("CD_mean", "CL_mean", "CL_rms")]
+    with options.output.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for reynolds in (20, 100):
+            if reynolds == 20:
+                coarse, best = steady(reynolds, 4), steady(reynolds, 5)
+                moved = [f"{np.abs((best - coarse)[of]).max():.6f}", ""]
+            else:
+                coarse, finer = periodic(reynolds, 3, STEP), periodic(reynolds, 3, STEP / 2)
+                best = periodic(reynolds, 4, STEP)
+                moved = [f"{np.abs((other - coarse)[of]).max():.6f}" for other in (best, finer)]
+            found = ["" if np.isnan(value) else f"{value:.6f}" for value in best]
+            writer.writerow([reynolds, upstream, length, height, OFFSET, *found, *moved])
+            file.flush()
+
+
+if __name__ == "__main__":
+    main()
