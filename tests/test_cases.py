@@ -2,8 +2,9 @@ import json
 
 import numpy as np
 import pytest
-from alsph import _alsph
+from alsph import _alsph, cases
 from alsph.cases import CASES, Body, Cylinder, FreeSurface, Sphere, TaylorGreen
+from alsph.cases.base import OFFERED
 from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind
 from alsph.geometry.solids import cylinder_rings
@@ -224,7 +225,22 @@ def test_a_case_is_shown_in_short_by_what_is_not_as_by_default():
     assert len(repr(body)) < 200 and str(body) == repr(body)
     case = Cylinder(reynolds=100, time_step=0.01)
     assert eval(repr(case), {"Cylinder": Cylinder}) == case
-    assert not {"model_dump", "model_fields", "copy", "dict"} & {*dir(case)} and "reynolds" in dir(case)
+
+
+def test_what_completes_on_a_case_is_its_parameters_and_what_it_is_used_by():
+    offered = {name for name in dir(Cylinder()) if not name.startswith("_")}
+    assert offered == {*Cylinder.model_fields, *OFFERED} and all(hasattr(Cylinder(), name) for name in OFFERED)
+
+    class Own(Cylinder):
+        """One of a user's."""
+
+        gap: float = 1.0
+
+        def clearance(self):
+            return self.gap
+
+    assert {name for name in dir(Own()) if not name.startswith("_")} - offered == {"gap", "clearance"}
+    assert {*dir(cases)} == {*cases.__all__}
 
 
 CONFINED = {"length": 6.0, "height": 4.0, "upstream": 2.0, "resolution": 10, "sides": "no_slip"}

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 import xarray
 from alsph.errors import ConfigError, RunFolderError
+from alsph.results.export import PlaneRecord
+from alsph.units import Units
 from synthetic import SHORT, write_flow
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
@@ -120,3 +122,50 @@ def test_without_a_library_its_extra_is_named(cylinder, monkeypatch, tmp_path):
     with pytest.raises(ConfigError, match=r"needs xarray: pip install xarray, or 'alsph\[tables\]'"):
         cylinder.to_grid(spacing=0.5).save(tmp_path / "flow.nc")
     assert not list(tmp_path.iterdir())
+
+
+def test_grids_in_si_are_those_in_d_and_u_times_the_factors(tmp_path, alsph):
+    units = Units(length=0.02, velocity=0.01, density=1000.0, kinematic_viscosity=1e-6)
+    case = SHORT.replace(units=units, reynolds=units.reynolds)
+    run = write_flow(tmp_path / "run", case, lambda x, t: x[:, ::-1] * [1, 2], pressure=7.0)
+    plain = run.to_grid(derived=["q_criterion"])
+    grid = plain.in_si(run.units)
+    factors = {"velocity": 0.01, "pressure": 0.1, "vorticity": 0.5, "q_criterion": 0.25}
+    for name, factor in factors.items():
+        np.testing.assert_allclose(grid.fields[name], plain.fields[name] * factor)
+    assert grid.time == pytest.approx(plain.time * 2) and grid.axes["x"] == pytest.approx(plain.axes["x"] * 0.02)
+    told = grid.to_xarray()
+    assert {name: told[name].units for name in ("x", "velocity_x", "pressure", "vorticity", "q_criterion")} == {
+        "x": "m",
+        "velocity_x": "m/s",
+        "pressure": "Pa",
+        "vorticity": "1/s",
+        "q_criterion": "1/s^2",
+    }
+    assert (told.time_units, plain.to_xarray().pressure.units) == ("s", "rho U^2")
+    code, _, stderr = alsph("export", run.path, "--si", "--to", "csv")
+    assert code == 0, stderr
+    rows = np.genfromtxt(run.path / "flow.csv", delimiter=",", names=True)
+    assert rows["x"].max() == pytest.approx(plain.axes["x"].max() * 0.02)
+    assert np.nanmax(rows["pressure"]) == pytest.approx(np.nanmax(plain.fields["pressure"]) * 0.1)
+
+
+def test_a_plane_record_in_si():
+    units = Units(length=2.0, velocity=3.0, density=5.0, kinematic_viscosity=1.0)
+    found = PlaneRecord(np.ones(2), {"x": np.ones(3)}, {"y": 1.0}, np.ones((2, 3, 2)), np.ones((2, 3))).in_si(units)
+    assert (found.time == 2 / 3).all() and (found.axes["x"] == 2).all() and found.place == {"y": 2.0}
+    assert (found.velocity == 3).all() and (found.pressure == 45).all()
+    assert found.to_xarray().velocity_y.units == "m/s"
+
+
+def test_a_run_without_units_is_not_exported_in_si(cylinder, alsph):
+    code, _, stderr = alsph("export", cylinder.path, "--si")
+    assert code == 2 and "does not know its units" in stderr
+
+
+def test_figures_of_a_run_with_units_say_what_they_are(tmp_path):
+    units = Units(length=0.02, velocity=0.01, density=1000.0, kinematic_viscosity=1e-6)
+    case = SHORT.replace(units=units, reynolds=units.reynolds)
+    run = write_flow(tmp_path / "run", case, lambda x, t: x[:, ::-1] * [1, 2], pressure=7.0)
+    said = run.plot_field("pressure").get_supxlabel().replace("\n", " ")
+    assert said.endswith("D = 0.02 m, U = 0.01 m/s, D/U = 2 s, ρU² = 0.1 Pa")

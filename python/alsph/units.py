@@ -86,6 +86,11 @@ class Units(Parameters):
         _, (density, velocity, length) = QUANTITIES[quantity]
         return float(self.density**density * self.velocity**velocity * self.length**length)
 
+    def told(self) -> str:
+        """Return what figures in D and U are in SI, in words."""
+        known: dict[str, Quantity] = {"D": "length", "U": "velocity", "D/U": "time", "ρU²": "pressure"}
+        return ", ".join(f"{name} = {self.factor(of):.4g} {QUANTITIES[of][0]}" for name, of in known.items())
+
     def __str__(self) -> str:
         """Return the values in words."""
         return (

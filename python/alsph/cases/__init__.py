@@ -127,6 +127,11 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    """Return the names to complete, without those of the files that the cases stand in."""
+    return sorted(__all__)
+
+
 def _add_installed() -> None:
     """Add the cases of other packages; one that cannot be loaded, or has a name that is taken, is told and left out."""
     for entry in entry_points(group="alsph.cases"):

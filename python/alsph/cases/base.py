@@ -25,6 +25,7 @@ from alsph.engine.problem import Problem
 from alsph.engine.simulation import Simulation
 from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
+from alsph.parameters import Parameters
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,6 +45,15 @@ def title_of(model: type) -> str:
     """Return the title of a case that has none: the first line of its docstring."""
     first = re.split(r"\n|Parameters\n---", (model.__doc__ or "").strip())[0].rstrip(".")
     return first[:1].lower() + first[1:] or name_of(model)
+
+
+OFFERED = (
+    *("name", "title", "run", "simulation", "draw", "replace", "describe", "remarks", "scales", "measures", "profiles"),
+    *("particles", "particle_spacing", "particle_estimate", "memory", "fluid_volume", "domain", "bodies"),
+    *("kinematic_viscosity", "cell_reynolds", "boundary_layer", "reference_area", "validated"),
+    *("default_until", "expected_time_step", "time_step_limits"),
+)
+"""What a case is used by, beside its parameters; the rest is for who writes one."""
 
 
 class Case(Discretised):
@@ -70,6 +80,14 @@ class Case(Discretised):
     """Measures and profiles, or beginnings of their names, that only a run with some results has."""
     code: ClassVar[Any] = None
     """The Python file of the user's that it stands in, a :class:`alsph.cases.source.Source`."""
+
+    def __dir__(self) -> list[str]:
+        """Return the names to complete: parameters, what a case is used by, and what a class of a user's adds."""
+        added = {
+            name for model in type(self).__mro__ if model.__module__.split(".")[0] != "alsph" for name in vars(model)
+        }
+        known = {*type(self).model_fields, *OFFERED, *(added - {*dir(Parameters)})}
+        return sorted(name for name in super().__dir__() if name in known or name.startswith("__"))
 
     @classmethod
     def parameter_names(cls) -> list[str]:

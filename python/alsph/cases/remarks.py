@@ -79,9 +79,13 @@ def refusal(remarks: Iterable[str]) -> str:
     return next((remark for remark in remarks if remark.startswith(TOO_THIN)), "")
 
 
+JOINED = "  |  "
+"""What stands between remarks below a picture."""
+
+
 def brief(remarks: Iterable[str]) -> str:
     """Return the remarks without what explains them, for a line below a picture."""
-    return "  |  ".join(remark.partition(";")[0] for remark in remarks)
+    return JOINED.join(remark.partition(";")[0] for remark in remarks)
 
 
 def boundary_layer(thickness: float, spacing: float) -> list[str]:

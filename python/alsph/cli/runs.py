@@ -256,6 +256,7 @@ def _export(
         list[str] | None,
         typer.Option(help="field to write, too, may be repeated", show_default="none", **one_of(*DERIVED)),
     ] = None,
+    si: Annotated[bool, typer.Option("--si", help="in SI, for a run that knows its units")] = False,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="file, .vtkhdf, .nc or .csv", show_default="RUN/flow.vtkhdf"),
@@ -271,7 +272,12 @@ def _export(
         choose("to", to, FORMATS)
     if output and to and output.suffix != FORMATS[to]:
         raise ConfigError(f"{output}: a file in the format {to} ends in {FORMATS[to]}")
-    grid = alsph.Run(path).to_grid(time, spacing, derived=field or [])
+    run = alsph.Run(path)
+    if si and run.units is None:
+        raise ConfigError(f"--si: {path} does not know its units; give them to the run, --units-length and so on")
+    grid = run.to_grid(time, spacing, derived=field or [])
     if time is not None:
         complain(f"fields at t* = {grid.time:.6g}, the output nearest to {time:g}")
+    if si and run.units:
+        grid = grid.in_si(run.units)
     say(grid.save(output or path / f"flow{FORMATS[to or 'vtkhdf']}"))

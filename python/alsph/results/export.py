@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +24,7 @@ from alsph.geometry.particles import Snapshot
 from alsph.parameters import choose
 from alsph.symbols import GENERAL, Symbols
 from alsph.text import shown
+from alsph.units import Quantity, Units
 
 if TYPE_CHECKING:
     import pandas
@@ -35,6 +36,15 @@ MOST_POINTS, LARGEST = 20_000_000, 1e15
 FORMATS = {"vtkhdf": ".vtkhdf", "netcdf": ".nc", "csv": ".csv"}
 """Formats of grids, and how their files end."""
 UNITS = {"velocity": "U", "pressure": "rho U^2", "vorticity": "U/D", **dict.fromkeys(DERIVED, "U^2/D^2")}
+IN_SI: dict[str, tuple[Quantity, int, str]] = {
+    "time": ("time", 1, "s"),
+    "length": ("length", 1, "m"),
+    "velocity": ("velocity", 1, "m/s"),
+    "pressure": ("pressure", 1, "Pa"),
+    "vorticity": ("rate", 1, "1/s"),
+    **dict.fromkeys(DERIVED, ("rate", 2, "1/s^2")),
+}
+"""Quantity of each field, its exponent, and the unit in SI."""
 
 
 def table(history: dict[str, FloatArray]) -> pandas.DataFrame:
@@ -59,12 +69,31 @@ class Grid:
         pressure, if they were asked for. NaN in bodies and where there is no fluid.
     symbols : Symbols
         What units are told in.
+    si : bool
+        Whether all is in SI (:meth:`in_si`).
     """
 
     time: float
     axes: dict[str, FloatArray]
     fields: dict[str, FloatArray]
     symbols: Symbols = GENERAL
+    si: bool = False
+
+    def in_si(self, units: Units) -> Grid:
+        """Return the grid in SI: lengths in m, velocities in m/s, pressures in Pa, the time in s.
+
+        Parameters
+        ----------
+        units : Units
+            What D, U and ρ are, as ``run.units``.
+        """
+        return replace(
+            self,
+            time=self.time * _factor("time", units),
+            axes={name: line * _factor("length", units) for name, line in self.axes.items()},
+            fields={name: values * _factor(name, units) for name, values in self.fields.items()},
+            si=True,
+        )
 
     def components(self) -> dict[str, FloatArray]:
         """Return the fields with each component of a vector by itself: ``velocity_x``, ``velocity_y``, ..."""
@@ -72,8 +101,8 @@ class Grid:
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the grid as a data set of xarray."""
-        dataset = _dataset(self.axes, self.fields, self.symbols)
-        return dataset.assign_attrs(time=self.time, time_units=self.symbols.time)
+        dataset = _dataset(self.axes, self.fields, self.symbols, self.si)
+        return dataset.assign_attrs(time=self.time, time_units=_unit("time", self.symbols, self.si))
 
     def save(self, path: str | Path) -> Path:
         """Write the grid to a file, whose suffix says the format, and return its path.
@@ -133,6 +162,8 @@ class PlaneRecord:
         Pressures [ρU²].
     symbols : Symbols
         What units are told in.
+    si : bool
+        Whether all is in SI (:meth:`in_si`).
     """
 
     time: FloatArray
@@ -141,6 +172,26 @@ class PlaneRecord:
     velocity: FloatArray
     pressure: FloatArray
     symbols: Symbols = GENERAL
+    si: bool = False
+
+    def in_si(self, units: Units) -> PlaneRecord:
+        """Return the record in SI: lengths in m, velocities in m/s, pressures in Pa, times in s.
+
+        Parameters
+        ----------
+        units : Units
+            What D, U and ρ are, as ``run.units``.
+        """
+        length = _factor("length", units)
+        return replace(
+            self,
+            time=self.time * _factor("time", units),
+            axes={name: line * length for name, line in self.axes.items()},
+            place={name: at * length for name, at in self.place.items()},
+            velocity=self.velocity * _factor("velocity", units),
+            pressure=self.pressure * _factor("pressure", units),
+            si=True,
+        )
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the record as a data set of xarray.
@@ -152,7 +203,7 @@ class PlaneRecord:
         """
         axes = {"time": self.time, **self.axes}
         fields = {"velocity": self.velocity, "pressure": self.pressure}
-        return _dataset(axes, fields, self.symbols).assign_coords(self.place)
+        return _dataset(axes, fields, self.symbols, self.si).assign_coords(self.place)
 
 
 def plane_records(found: Probes, grids: list[tuple[FloatArray, ...]], symbols: Symbols) -> list[PlaneRecord]:
@@ -189,14 +240,27 @@ def _components(fields: dict[str, FloatArray], axes: int) -> Iterator[tuple[str,
             yield from ((f"{name}_{axis}", values[..., k]) for k, axis in enumerate(AXES[: values.shape[-1]]))
 
 
-def _dataset(axes: dict[str, FloatArray], fields: dict[str, FloatArray], symbols: Symbols) -> xarray.Dataset:
+def _factor(field: str, units: Units) -> float:
+    """Return what one unit of a field, or of a time or length, is in SI."""
+    quantity, power, _ = IN_SI[field]
+    return units.factor(quantity) ** power
+
+
+def _unit(field: str, symbols: Symbols, si: bool) -> str:
+    """Return the unit of a field, or of a time or length."""
+    if si:
+        return IN_SI[field][2]
+    return symbols(UNITS[field]) if field in UNITS else symbols.time if field == "time" else symbols.length
+
+
+def _dataset(axes: dict[str, FloatArray], fields: dict[str, FloatArray], symbols: Symbols, si: bool) -> xarray.Dataset:
     """Return fields as a data set of xarray: over time, if it is among the axes, then along z, y and x."""
     columns = {
-        name: ([*axes], values, {"long_name": _long_name(name, own), "units": symbols(UNITS[own])})
+        name: ([*axes], values, {"long_name": _long_name(name, own), "units": _unit(own, symbols, si)})
         for own, field in fields.items()
         for name, values in _components({own: field}, len(axes))
     }
-    units = {name: {"units": symbols.time if name == "time" else symbols.length} for name in axes}
+    units = {name: {"units": _unit("time" if name == "time" else "length", symbols, si)} for name in axes}
     lines = {name: (name, line, units[name]) for name, line in axes.items()}
     dataset: xarray.Dataset = _library("xarray").Dataset(columns, lines)
     return dataset.transpose(*[name for name in ("time", *reversed(AXES)) if name in axes])

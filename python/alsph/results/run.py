@@ -379,9 +379,10 @@ class Run(Loads):
         return ", ".join([in_figure(str(case).replace("_", " ")), *numbers])
 
     def _said(self) -> str:
-        """Return the run's remarks in short, as they stand below its figures."""
+        """Return what stands below its figures: the run's remarks in short, and what their units are in SI."""
         try:
-            return remarks.brief(self.remarks)
+            units = self.units.told() if self.units else ""
+            return remarks.JOINED.join(filter(None, (remarks.brief(self.remarks), units)))
         except RunFolderError:  # a field can be drawn all the same
             return "no remarks: case or history of the run cannot be read"
 
