@@ -265,3 +265,51 @@ def test_probes_given_several_times_are_joined(alsph, tmp_path):
     )
     code, _, err = alsph("run", "taylor_green", "--probes", "0.5,0.5", *options, "--probes", "x", "--force")
     assert code == 2 and "probes" in err and len(err.splitlines()) == 1
+
+
+def test_probes_as_a_table(vortices, alsph, tmp_path):
+    found = vortices.probes
+    columns = found.columns()
+    assert list(columns) == ["time", "x", "y", "velocity_x", "velocity_y", "pressure"]
+    row = 2 * len(found.position) + 1
+    assert columns["time"][row] == found.time[2] and columns["y"][row] == found.position[1, 1]
+    assert columns["velocity_y"][row] == found.velocity[2, 1, 1] and columns["pressure"][row] == found.pressure[2, 1]
+    code, stdout, stderr = alsph("export", vortices.path, "--probes", "-o", tmp_path / "probes.csv")
+    assert code == 0 and "probes.csv" in stdout, stderr
+    read = np.genfromtxt(tmp_path / "probes.csv", delimiter=",", names=True)
+    for name, values in columns.items():
+        np.testing.assert_allclose(read[name], values, rtol=1e-8, atol=1e-12)
+    points, times = found.velocity.shape[1], len(found.time)
+    assert repr(found).startswith(f"Probes({points} points, {times} times from t* = 0.0")
+    assert vortices.summary()["probes"] == f"{points} points, {times} times"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--probes", "--time", "0.1"], "--probes: not with --time"),
+        (["--probes", "-o", "probes.nc"], "ends in .csv"),
+        (["--probes", "--si"], "does not know its units"),
+    ],
+)
+def test_what_of_probes_cannot_be_written(vortices, alsph, arguments, message):
+    code, _, stderr = alsph("export", vortices.path, *arguments)
+    assert code == 2 and message in stderr
+
+
+def test_a_run_without_probes_has_none_to_write(alsph, tmp_path):
+    run = TaylorGreen(resolution=8).run(tmp_path / "run", until=0.02, progress=False)
+    assert repr(run.probes) == "Probes(nothing recorded)" and "probes" not in run.summary()
+    code, _, stderr = alsph("export", run.path, "--probes")
+    assert code == 2 and "has no probes" in stderr
+    case = TaylorGreen(resolution=8, units=WATER)
+    told = case.run(tmp_path / "si", until=0.1, probes=[[0.2, 0.3]], probe_interval=0.02, progress=False)
+    code, _, stderr = alsph("export", told.path, "--probes", "--si")
+    assert code == 0, stderr
+    read = np.genfromtxt(told.path / "probes.csv", delimiter=",", names=True)
+    assert np.atleast_1d(read["x"])[0] == pytest.approx(0.2 * 0.02)
+    assert read["pressure"] == pytest.approx(told.probes.pressure[:, 0] * 0.1)
+    assert read["velocity_x"] == pytest.approx(told.probes.velocity[:, 0, 0] * 0.01)
+
+
+WATER = {"length": 0.02, "velocity": 0.01, "density": 1000.0, "kinematic_viscosity": 1e-6}

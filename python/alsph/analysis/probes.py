@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alsph.arrays import FloatArray
+from alsph.arrays import AXES, FloatArray
 from alsph.errors import ConfigError
 from alsph.geometry.points import checked_point
 from alsph.text import shown
@@ -34,6 +34,21 @@ class Probes:
     time: FloatArray
     velocity: FloatArray
     pressure: FloatArray
+
+    def columns(self) -> dict[str, FloatArray]:
+        """Return all of it as a table, one row for each time and point: time, place, velocity and pressure (k m,)."""
+        times, count = len(self.time), len(self.position)
+        axes = AXES[: self.position.shape[1]]
+        place = {name: np.tile(self.position[:, k], times) for k, name in enumerate(axes)}
+        velocity = {f"velocity_{name}": self.velocity[..., k].ravel() for k, name in enumerate(axes)}
+        return {"time": np.repeat(self.time, count), **place, **velocity, "pressure": self.pressure.ravel()}
+
+    def __repr__(self) -> str:
+        """Say how many points and times there are, and when."""
+        if not len(self.time):
+            return "Probes(nothing recorded)"
+        first, last = self.time[0], self.time[-1]
+        return f"Probes({len(self.position)} points, {len(self.time)} times from t* = {first:.4g} to {last:.4g})"
 
 
 @dataclass(frozen=True, eq=False)

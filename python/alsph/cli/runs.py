@@ -256,17 +256,21 @@ def _export(
         list[str] | None,
         typer.Option(help="field to write, too, may be repeated", show_default="none", **one_of(*DERIVED)),
     ] = None,
+    probes: Annotated[bool, typer.Option("--probes", help="write what probes recorded in place of fields")] = False,
     si: Annotated[bool, typer.Option("--si", help="in SI, for a run that knows its units")] = False,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="file, .vtkhdf, .nc or .csv", show_default="RUN/flow.vtkhdf"),
+        typer.Option(
+            "--output", "-o", help="file, .vtkhdf, .nc or .csv", show_default="RUN/flow.vtkhdf, RUN/probes.csv"
+        ),
     ] = None,
 ) -> None:
     """Write a snapshot of a run on a regular grid, for other programs: velocity, pressure and vorticity.
 
-    ParaView 5.12 or later reads vtkhdf; netcdf needs pip install 'alsph[tables]'. Bodies are NaN.
+    ParaView 5.12 or later reads vtkhdf; netcdf needs pip install 'alsph[tables]'. Bodies are NaN. What probes recorded
+    is written as a table, a row for each time and point.
     """
-    from alsph.results.export import FORMATS
+    from alsph.results.export import FORMATS, save_probes
 
     if to is not None:
         choose("to", to, FORMATS)
@@ -275,6 +279,11 @@ def _export(
     run = alsph.Run(path)
     if si and run.units is None:
         raise ConfigError(f"--si: {path} does not know its units; give them to the run, --units-length and so on")
+    if probes:
+        if extra := [name for name, given in (("time", time), ("spacing", spacing), ("field", field)) if given]:
+            raise ConfigError(f"--probes: not with --{extra[0]}, which is of the fields")
+        say(save_probes(run.probes, output or path / "probes.csv", run.units if si else None))
+        return
     grid = run.to_grid(time, spacing, derived=field or [])
     if time is not None:
         complain(f"fields at t* = {grid.time:.6g}, the output nearest to {time:g}")

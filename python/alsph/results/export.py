@@ -139,9 +139,7 @@ class Grid:
 
     def _write_csv(self, path: Path) -> None:
         points = np.meshgrid(*self.axes.values(), indexing="ij")
-        columns = dict(zip(self.axes, points, strict=True)) | self.components()
-        rows = np.stack([column.ravel() for column in columns.values()], axis=1)
-        np.savetxt(path, rows, "%.9g", ",", header=",".join(columns), comments="")
+        _write_columns(dict(zip(self.axes, points, strict=True)) | self.components(), path)
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,6 +236,44 @@ def _components(fields: dict[str, FloatArray], axes: int) -> Iterator[tuple[str,
             yield name, values
         else:
             yield from ((f"{name}_{axis}", values[..., k]) for k, axis in enumerate(AXES[: values.shape[-1]]))
+
+
+def save_probes(found: Probes, path: str | Path, units: Units | None = None) -> Path:
+    """Write what probes recorded to a CSV file, one row for each time and point, and return its path.
+
+    Parameters
+    ----------
+    found : Probes
+    path : path
+        The file.
+    units : Units, optional
+        What D, U and ρ are, to have it in SI.
+
+    Raises
+    ------
+    ConfigError
+        If nothing was recorded, or the file does not end in .csv.
+    RunFolderError
+        If the file is a link or a special file.
+    """
+    path = Path(path)
+    if path.suffix != ".csv":
+        raise ConfigError(f"{path}: what probes recorded is written to a file that ends in .csv")
+    if not len(found.time):
+        raise ConfigError("nothing was recorded: the run has no probes")
+    columns = found.columns()
+    if units:
+        of = {name: "length" for name in AXES} | {name: name.partition("_")[0] for name in columns if name not in AXES}
+        columns = {name: values * _factor(of[name], units) for name, values in columns.items()}
+    check_target(path)
+    with replacing(path) as temporary:
+        _write_columns(columns, temporary)
+    return path
+
+
+def _write_columns(columns: dict[str, FloatArray], path: Path) -> None:
+    rows = np.stack([column.ravel() for column in columns.values()], axis=1)
+    np.savetxt(path, rows, "%.9g", ",", header=",".join(columns), comments="")
 
 
 def _factor(field: str, units: Units) -> float:

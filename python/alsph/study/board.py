@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from rich.console import Console
+from rich.console import Console, Group
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
@@ -77,26 +77,31 @@ class Board:
             self.last_line = now
             for point in self.points:
                 if found[point.name].status == "running":
-                    self.say(f"  {self._line(point, found[point.name], now)}")
+                    status, label, reached = self._cells(point, found[point.name], now)
+                    self.say(f"  {status:8}  {label}  {reached}")
             self.say(self._total(found, now))
 
-    def _table(self, found: Mapping[str, State], now: float) -> Table:
-        table = Table.grid(padding=(0, 2))
+    def _table(self, found: Mapping[str, State], now: float) -> Group:
+        """Return a row for each run, whose label is cut where the terminal has no room for it, and the total."""
+        table = Table.grid(padding=(0, 2), expand=True)
+        for ratio in (None, 1, None):
+            table.add_column(no_wrap=True, overflow="ellipsis", ratio=ratio)
         shown = self.points if len(self.points) <= self.console.height - 4 else self._lively(found)
         for point in shown:
-            table.add_row(Text(printable(self._line(point, found[point.name], now))))
-        table.add_row(Text(printable(self._total(found, now))))
-        return table
+            table.add_row(*(Text(printable(cell)) for cell in self._cells(point, found[point.name], now)))
+        return Group(table, Text(printable(self._total(found, now)), overflow="fold"))
 
     def _lively(self, found: Mapping[str, State]) -> list[Point]:
         """Return the runs that are going on or have failed, where the screen does not hold all."""
         return [point for point in self.points if found[point.name].status in ("running", "failed")]
 
-    def _line(self, point: Point, state: State, now: float) -> str:
-        line = f"{state.status:8}  {point.label}"
-        if state.status == "running":
-            line += f"  t* {state.time:.2f} of {point.config.until_in_words}  ETA {self._left(point, state, now)}"
-        return f"{line}  {state.message}" if state.status == "failed" else line
+    def _cells(self, point: Point, state: State, now: float) -> tuple[str, str, str]:
+        """Return the status of a run, its label, with what went wrong, and how far it is."""
+        label = f"{point.label}  {state.message}" if state.status == "failed" else point.label
+        if state.status != "running":
+            return state.status, label, ""
+        reached = f"t* {state.time:.2f} of {point.config.until_in_words}  ETA {self._left(point, state, now)}"
+        return state.status, label, reached
 
     def _left(self, point: Point, state: State, now: float) -> str:
         time, seen = self.first.get(point.name, (state.time, now))
