@@ -96,8 +96,8 @@ PYTHON = Path(__file__).parents[1] / "python" / "alsph"
 
 PYTHON_FLOORS = (
     ("_alsph", "arrays", "text"),
-    ("errors",),
-    ("memory", "parameters", "tables", "expressions", "symbols"),
+    ("errors", "tables"),
+    ("memory", "parameters", "expressions", "symbols"),
     ("geometry", "reference", "run_settings", "units"),
     ("analysis", "engine"),
     ("cases", "folder"),

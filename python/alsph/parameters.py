@@ -1,7 +1,6 @@
 """The base of all validated parameter sets: strict types, unknown names refused, errors in one line."""
 
 import difflib
-import html
 import inspect
 from collections.abc import Iterable
 from typing import Any, NoReturn, Self
@@ -10,6 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from alsph.errors import ConfigError
+from alsph.tables import html
 from alsph.text import shown
 
 WHOLE, NUMBER = "must be a whole number", "must be a number"
@@ -101,12 +101,8 @@ class Parameters(BaseModel):
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><th>{name}</th><td>{html.escape(shown(getattr(self, name)))}</td>"
-            f"<td style='text-align: left'>{html.escape(self.describe(name))}</td></tr>"
-            for name in self.parameter_names()
-        )
-        return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
+        rows = [(name, shown(getattr(self, name)), self.describe(name)) for name in self.parameter_names()]
+        return html((), rows, named=True, caption=type(self).__name__)
 
     @classmethod
     def parameter_names(cls) -> list[str]:

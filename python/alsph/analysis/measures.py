@@ -1,6 +1,5 @@
 """What a run is judged by: numbers and profiles beside their reference values."""
 
-import html
 import math
 import re
 from dataclasses import dataclass, replace
@@ -10,6 +9,7 @@ import numpy as np
 
 from alsph.analysis.averages import Estimate
 from alsph.arrays import FloatArray
+from alsph.tables import html
 
 
 @dataclass(frozen=True)
@@ -55,22 +55,17 @@ class Measures(list[Measure]):
     """Measures, which notebooks show as a table."""
 
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><th>{html.escape(measure.name)}</th>"
-            + "".join(
-                f"<td>{html.escape(text)}</td>"
-                for text in (
-                    f"{measure.value}" if isinstance(measure.value, Estimate) else f"{measure.value:.5g}",
-                    "" if math.isnan(measure.reference) else f"{measure.reference:.5g}",
-                    "" if math.isnan(measure.error) or not measure.reference else f"{100 * measure.error:+.2g} %",
-                    measure.source,
-                )
+        rows = [
+            (
+                measure.name,
+                f"{measure.value}" if isinstance(measure.value, Estimate) else f"{measure.value:.5g}",
+                "" if math.isnan(measure.reference) else f"{measure.reference:.5g}",
+                "" if math.isnan(measure.error) or not measure.reference else f"{100 * measure.error:+.2g} %",
+                measure.source,
             )
-            + "</tr>"
             for measure in self
-        )
-        titles = "".join(f"<th>{title}</th>" for title in ("", "value", "reference", "error", "source"))
-        return f"<table><tr>{titles}</tr>{rows}</table>"
+        ]
+        return html(("", "value", "reference", "error", "source"), rows, named=True)
 
 
 @dataclass(frozen=True, eq=False)

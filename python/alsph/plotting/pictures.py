@@ -171,7 +171,8 @@ def _draw_field(
     style = field_style(name)
     if limit is not None and not (isinstance(limit, int | float | np.number) and 0 < limit < np.inf):
         raise ConfigError(f"limit = {shown(limit)}: must be a number above zero")
-    picture, body, inside = _raster(snapshot, name, spacing, extent, plane)
+    picture, inside = _raster(snapshot, name, spacing, extent, plane)
+    body = _solid(snapshot, spacing, extent, plane, picture)
     limit = limit or _limit(picture[inside])
     lowest = -limit if style.signed else 0.0
     scale: dict[str, Any] = {"cmap": style.colours, "vmin": lowest, "vmax": limit}
@@ -212,7 +213,7 @@ def colour_limit(
     plane: Plane | None = None,
 ) -> float:
     """Return the end of the colour scale that a picture of a part of the plane has by itself."""
-    picture, _, inside = _raster(snapshot, name, spacing, extent, plane)
+    picture, inside = _raster(snapshot, name, spacing, extent, plane)
     return _limit(picture[inside])
 
 
@@ -258,8 +259,8 @@ def extent_of(
 
 def _raster(
     snapshot: Snapshot, name: str, spacing: float, extent: tuple[float, float, float, float], plane: Plane | None
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Return the fluid's field (rows, columns), the share of each pixel that is solid, and which make the colour scale.
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the fluid's field (rows, columns), and which pixels make the colour scale.
 
     The field is NaN where there is none. Of a fluid with a free surface, gradients at it and in spray, where half the
     neighbours are missing, make no scale.
@@ -276,8 +277,22 @@ def _raster(
     if meets_air(whole):
         full = sampling.fill(fluid, points, spacing).reshape(shape) > INSIDE
         scaled = scaled & full if (scaled & full).any() else scaled
+    return picture, scaled
+
+
+def _solid(
+    snapshot: Snapshot,
+    spacing: float,
+    extent: tuple[float, float, float, float],
+    plane: Plane | None,
+    picture: FloatArray,
+) -> FloatArray:
+    """Return the share of each pixel that is solid, where there is a picture (rows, columns) of the fluid."""
+    points, _ = _pixels(extent, spacing / PIXELS_PER_SPACING)
+    if plane is not None:
+        points, snapshot = plane.points(points), plane.near(snapshot, spacing)
     body = _outlined(snapshot, spacing, extent, plane)
-    return picture, _filled(snapshot, spacing, points, picture, plane) if body is None else body, scaled
+    return _filled(snapshot, spacing, points, picture, plane) if body is None else body
 
 
 def _pixels(extent: tuple[float, float, float, float], size: float) -> tuple[FloatArray, tuple[int, int]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 import shlex
 from contextlib import suppress
@@ -32,6 +31,7 @@ from alsph.results.export import Grid
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.loads import Loads
 from alsph.results.outcome import made, outcome, unsolved
+from alsph.tables import html
 from alsph.text import duration, in_figure, printable, shown
 from alsph.units import Units
 
@@ -398,8 +398,7 @@ class Run(Loads):
         return printable(f"Run('{self.path}': {name}, {self.status}, {clock} = {reached:.4g})")
 
     def _repr_html_(self) -> str:
-        rows = ((html.escape(name), html.escape(printable(str(value)))) for name, value in self.summary().items())
-        return "<table>" + "".join(f"<tr><th>{name}</th><td>{value}</td></tr>" for name, value in rows) + "</table>"
+        return html((), [(name, str(value)) for name, value in self.summary().items()], named=True)
 
 
 def _plotting() -> ModuleType:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +26,7 @@ from alsph.results.run import Run
 from alsph.study.declaration import Figure, Point, Study, text
 from alsph.study.state import ENDED, RUNS, State, states
 from alsph.symbols import Symbols, in_common
-from alsph.tables import markdown
+from alsph.tables import html, markdown
 from alsph.text import in_figure, printable
 
 if TYPE_CHECKING:
@@ -222,14 +221,7 @@ class Results:
 
     def _repr_html_(self) -> str:
         columns = [name for name in self._columns() if name != "folder"]
-        head = "".join(f"<th>{html.escape(printable(name))}</th>" for name in columns)
-        body = "".join(
-            "<tr>"
-            + "".join(f"<td>{html.escape(printable(_shown(row.get(name, ''))))}</td>" for name in columns)
-            + "</tr>"
-            for row in self.rows
-        )
-        return f"<table><tr>{head}</tr>{body}</table>"
+        return html(columns, [[_shown(row.get(name, "")) for name in columns] for row in self.rows])
 
     @property
     def symbols(self) -> Symbols:

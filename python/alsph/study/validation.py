@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -22,7 +21,7 @@ from alsph.results.run import Run
 from alsph.run_settings import RunSettings
 from alsph.running.control import Control
 from alsph.running.start import complete
-from alsph.tables import markdown
+from alsph.tables import html, markdown
 from alsph.text import duration
 
 if TYPE_CHECKING:
@@ -252,9 +251,7 @@ class Report:
         )
 
     def _repr_html_(self) -> str:
-        lines = [("th", HEADER), *(("td", row.cells) for row in self.rows)]
-        rows = ("".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) for tag, cells in lines)
-        return f"<p>{self.verdict}</p><table>" + "".join(f"<tr>{row}</tr>" for row in rows) + "</table>"
+        return f"<p>{self.verdict}</p>{html(HEADER, [row.cells for row in self.rows])}"
 
 
 def validate(
