@@ -43,6 +43,6 @@ def html(header: Sequence[str], rows: Iterable[Sequence[str]], *, named: bool = 
 
 def _line(cells: Sequence[str], first: str, others: str) -> str:
     """Return a row of a table in HTML, whose first cell has one tag and the others another."""
-    tags = [first, *[others] * (len(cells) - 1)]
-    body = (f"<{tag}>{escaping.escape(printable(cell))}</{tag}>" for tag, cell in zip(tags, cells, strict=True))
+    tags = [first, *[others] * len(cells)]
+    body = (f"<{tag}>{escaping.escape(printable(cell))}</{tag}>" for tag, cell in zip(tags, cells, strict=False))
     return f"<tr>{''.join(body)}</tr>"
