@@ -10,7 +10,7 @@ EXTENSION := python/alsph/_alsph.abi3.so
 SOURCES := Cargo.toml Cargo.lock pyproject.toml $(shell find rust -name '*.rs')
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: build run wheel test test-rust test-python test-validation validate docs bench clean mutants-python
+.PHONY: build run wheel test test-rust test-python test-validation validate docs links bench clean mutants-python
 
 build: $(EXTENSION)
 
@@ -42,6 +42,9 @@ validate: $(EXTENSION)  ## Cases beside their reference solutions, in minutes on
 docs: $(EXTENSION) $(SPHINX)  ## The documentation site, in target/docs; a warning is an error.
 	rm -rf docs/generated
 	$(BIN)/python -m sphinx --fresh-env --fail-on-warning --keep-going -b html docs target/docs
+
+links: $(EXTENSION) $(SPHINX)  ## Whether the pages of other sites that the documentation links to are there.
+	$(BIN)/python -m sphinx -D nb_execution_mode=off -b linkcheck docs target/links
 
 wheel: $(ENVIRONMENT)  ## A wheel for every Linux of this machine's kind with glibc 2.28 or later, in target/wheels.
 	$(BIN)/python -m pip install --quiet --group wheel

@@ -89,7 +89,8 @@ def test_what_is_not_used_is_not_loaded(program, loaded):
         ("alsph plot runs/a --format p", ["png", "pdf"]),
         ("alsph export runs/a --to ", ["vtkhdf", "netcdf", "csv"]),
         ("alsph study run rey", ["reynolds"]),
-        ("alsph validate cav", ["cavity"]),
+        ("alsph validate cav", []),
+        ("alsph validate --full cav", ["cavity"]),
         ("alsph info ru", []),  # a path, which the shell completes
     ],
 )

@@ -3,6 +3,7 @@
 What does the work is imported where it is called, so that help comes at once.
 """
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -32,7 +33,9 @@ def _run(
     from alsph.running.start import start
 
     control = Control(walltime=seconds_of(walltime), retry=retry)
-    say_run(start(given.config, output or Path("runs") / given.config.case.name, control, force=force))
+    run = start(given.config, output or Path("runs") / given.config.case.name, control, force=force)
+    say_run(run)
+    say(f"\nfigures: alsph plot {shlex.quote(str(run.path))}")
 
 
 def _describe(

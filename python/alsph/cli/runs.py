@@ -231,16 +231,22 @@ def _animate(
 
     run = alsph.Run(path)
     name: Any = field
-    times = {what: value for what, value in (("start", start), ("end", end)) if value is not None}
+    chosen: dict[str, Any] = {"start": start, "end": end, "limit": limit, "plane": plane}
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("pictures", total=None)
 
+        pictures = 0
+
         def progress(done: int, count: int) -> None:
+            nonlocal pictures
+            pictures = count
             bar.update(task, completed=done, total=count)
 
-        film = run.animate(name, output, every=every, fps=fps, limit=limit, plane=plane, progress=progress, **times)
+        given = {what: value for what, value in chosen.items() if value is not None}
+        film = run.animate(name, output, every=every, fps=fps, progress=progress, **given)
     say(film)
+    complain(f"{pictures} pictures, {pictures / fps:.3g} s; a run with a smaller --output-interval has more")
 
 
 @app.command("export")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
+from collections.abc import Callable
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -295,7 +296,20 @@ class Run(Loads):
         case = self.config.case
         return Plane.of(case.picture_axis if given is None else given, case.middle)
 
-    def animate(self, name: Field = "vorticity", path: str | Path | None = None, **options: Any) -> Path:
+    def animate(
+        self,
+        name: Field = "vorticity",
+        path: str | Path | None = None,
+        *,
+        start: float = -math.inf,
+        end: float = math.inf,
+        every: int = 1,
+        fps: float = 10.0,
+        limit: float | None = None,
+        view: tuple[float, float, float, float] | None = None,
+        plane: str | None = None,
+        progress: Callable[[int, int], None] = lambda done, count: None,
+    ) -> Path:
         """Make a film of a field from the snapshots.
 
         Parameters
@@ -304,9 +318,16 @@ class Run(Loads):
         path : path, optional
             File that ends in .gif or, with imageio-ffmpeg (``pip install 'alsph[video]'``), .mp4 or .webm; ``NAME.gif``
             among the run's figures if None.
-        **options
-            ``start`` and ``end``, times [D/U]; ``every``, of how many snapshots one is taken; ``fps``, pictures a
-            second; ``limit``, ``view`` and ``plane`` as of :meth:`plot_field`, the same for all pictures.
+        start, end : float
+            Times between which snapshots are taken [D/U].
+        every : int
+            Of how many snapshots one is taken.
+        fps : float
+            Pictures a second.
+        limit, view, plane
+            As of :meth:`plot_field`, the same for all pictures.
+        progress : callable
+            Called with the number of pictures that are done, and of all.
 
         Returns
         -------
@@ -318,12 +339,14 @@ class Run(Loads):
         ConfigError
             If there are fewer than two snapshots, or an option cannot be used.
         """
-        if len(self.times):
-            options["plane"] = self.plane(self.snapshot(self.times[0]), options.get("plane"))
+        plane_of = self.plane(self.snapshot(self.times[0]), plane) if len(self.times) else None
         if path is None:
             check_folder(self.path / "figures")
         target: Path = _plotting().Film(path if path is not None else self.path / "figures" / f"{name}.gif")
-        _plotting().animate(self, name, target, title=self._title, said=self._said(), symbols=self.symbols, **options)
+        chosen = {"start": start, "end": end, "every": every, "fps": fps}
+        seen = {"limit": limit, "view": view, "plane": plane_of, "progress": progress}
+        told = {"title": self._title, "said": self._said(), "symbols": self.symbols}
+        _plotting().animate(self, name, target, **chosen, **seen, **told)
         return target
 
     def plot_pressure_coefficient(
