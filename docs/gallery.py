@@ -41,8 +41,8 @@ PROFILES = {"heaving_cylinder"}
 def commands() -> dict[str, list[str]]:
     """Return the command of each case in gallery.md."""
     text = (HERE / "gallery.md").read_text(encoding="utf-8")
-    lines = re.findall(r"^    alsph (run (\w+) .*)$", text, re.MULTILINE)
-    return {case: shlex.split(line) for line, case in lines}
+    lines = re.findall(r"^    alsph (run (\S+) .*)$", text, re.MULTILINE)
+    return {Path(case).stem: shlex.split(line) for line, case in lines}
 
 
 def compute(case: str, arguments: list[str]) -> None:

@@ -41,7 +41,7 @@ def steady(reynolds: float, order: int) -> np.ndarray:
     settled = flow(reynolds, order)
     settled.settle()
     drag, pressure, viscous, lift, *_ = settled.loads()
-    return np.array([drag, pressure, viscous, lift, abs(lift), 0, np.nan, drag, drag, lift, lift])
+    return np.array([drag, pressure, viscous, lift, *[np.nan] * 7])
 
 
 def periodic(reynolds: float, order: int, step: float) -> np.ndarray:
@@ -69,7 +69,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("cylinder_confined.csv"), help="(%(default)s)")
     options = parser.parse_args()
     length, height, upstream = CHANNEL
-    of = [FOUND.index(name) for name in ("CD_mean", "CL_mean", "CL_rms")]
+    of = [FOUND.index(name) for name in ("CD_mean", "CL_mean")]
     with options.output.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)

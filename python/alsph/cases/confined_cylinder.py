@@ -45,7 +45,6 @@ class ConfinedCylinder(Cylinder):
         """Return the forces, among them the mean lift, and the Strouhal number."""
         known = self._reference() or Reference({}, "")
         lift = known.results.get("mean lift coefficient", math.nan)
-        # it is a fiftieth of the lift's amplitude, so how near it comes is told of that
         mean = Measure("mean lift coefficient", run.lift.mean, lift, 0.5, known.source)
         return [measure for measure in super().measures(run) if measure.name != mean.name] + [mean]
 

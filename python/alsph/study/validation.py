@@ -120,7 +120,7 @@ FULL = (
     Entry("concentric_release", (10, 20, 40), until=0.11, parameters={"density_ratio": 2.0}),
     Entry("rotating_cylinder", (10, 20), until=4.0),
     Entry("confined_cylinder", (10, 20), until=20.0, parameters={"reynolds": 20}, continued=12.0),
-    Entry("confined_cylinder", (10, 20), until=70.0, continued=35.0),
+    Entry("confined_cylinder", (10, 20, 30), until=70.0, continued=35.0),
     Entry("oscillating_cylinder", (20, 32), until=15.0),
     Entry("towed_cylinder", (10, 20), until=6.0),
     Entry("settling_sphere", (8,), until=12.0),
