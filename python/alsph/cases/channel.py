@@ -124,8 +124,9 @@ class Channel(Case):
     def remarks(self) -> list[str]:
         """Return what is to be said of the resolution, the method and the channel."""
         behind = self.length - self.upstream - self.bounds[2]
-        slowed = self.slowed if self.sides == "slip" else 0.0  # the benchmarks with a parabola have their inlet near
-        return [*super().remarks(), *remarks.channel(self.blocked, self.upstream, behind, self.blockage, slowed)]
+        # Who asks for sides that hold the fluid wants them near.
+        near = (self.blockage, self.slowed) if self.sides == "slip" else (0.0, 0.0)
+        return [*super().remarks(), *remarks.channel(self.blocked, self.upstream, behind, *near)]
 
     @property
     def blocked(self) -> float:
