@@ -333,3 +333,33 @@ def test_a_picture_goes_on_across_periodic_sides():
     inside = row(box)
     assert inside == pytest.approx(inside[5] * np.sin(2 * np.pi * x) / np.sin(2 * np.pi * x[5]), abs=0.03)
     assert abs(row(None) - inside)[0] > 0.03
+
+
+MOVING = [
+    *("floating_box", "rolling_tank", "heaving_cylinder", "oscillating_cylinder", "towed_cylinder", "settling_sphere")
+]
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_a_body_that_moves_is_drawn_by_its_outline_where_it_has_come_to(tmp_path, name):
+    model = CASES[name]
+    case = model(resolution=10 if model.in_space == 2 else 8)
+    run = case.run(tmp_path / "run", until=0.3, output_interval=0.3, progress=False)
+    snapshot, spacing = run.snapshot(), case.particle_spacing
+    height = snapshot.solid(snapshot.position)
+    solid, start = ~snapshot.fluid, run.snapshot(0.0)
+    begun = start.position[~start.fluid]
+    assert np.abs(snapshot.position[solid].mean(axis=0) - begun.mean(axis=0)).max() > 1e-6
+    first = start.solid(begun)
+    np.testing.assert_allclose(np.sort(height[solid]), np.sort(first), atol=2e-3 * spacing)
+    assert height[~solid].min() > -0.25 * spacing
+
+
+def test_outlines_turn_with_the_body(tmp_path):
+    case = CASES["rolling_tank"](resolution=10)
+    run = case.run(tmp_path / "run", until=1.0, output_interval=1.0, progress=False)
+    angle = case.motion(np.zeros((1, 2)), run.snapshot().time)[2]
+    assert abs(angle) > 0.02
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    inner = np.array([[0.0, -1e-3], [0.0, 1e-3]]) @ turn.T  # on both sides of the floor
+    assert np.sign(run.snapshot().solid(inner)).tolist() == [-1, 1]

@@ -17,6 +17,7 @@ from alsph.cases.heave import SOURCE, linear_heave
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, inside, lattice
+from alsph.geometry.packing import Planar
 from alsph.geometry.particles import join
 from alsph.geometry.rigid import Rigid
 from alsph.geometry.solids import body_layers
@@ -134,13 +135,22 @@ class FloatingBox(FreeSurface):
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return water at rest around the box."""
-        (length, height), spacing = self.size, self.particle_spacing
-        box = shapely.box(-length / 2, self.bottom, length / 2, self.bottom + height)
+        spacing, box = self.particle_spacing, self._box
         columns = cell_centres(self.whole_cells("tank_length", self.tank_length), spacing) - self.tank_length / 2
         position = lattice(columns, cell_centres(self.resolution, spacing))
         position = position[~inside(box, position)]
         water = self.fluid(position, np.zeros_like(position), 1 - position[:, 1])
         return join(water, body_layers(box, spacing, self.support_layers).particles())
+
+    @property
+    def _box(self) -> shapely.Polygon:
+        """The box where it begins [H]."""
+        length, height = self.size
+        return shapely.box(-length / 2, self.bottom, length / 2, self.bottom + height)
+
+    def solid_height(self, position: FloatArray) -> FloatArray:
+        """Return how far points (n, 2) lie outside of the box where it begins [H]."""
+        return Planar(self._box).height(position)
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the mean force of the water on the box over its weight, the largest turn, and the heave."""

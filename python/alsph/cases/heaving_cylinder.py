@@ -121,6 +121,10 @@ class HeavingCylinder(FreeSurface):
         position = pack(cells, cylinder, solid.position, spacing)
         return join(self.fluid(position, np.zeros_like(position), -position[:, 1]), solid.particles())
 
+    def solid_height(self, position: FloatArray) -> FloatArray:
+        """Return how far points (n, 2) lie outside of the cylinder where it begins [R]."""
+        return np.asarray(np.hypot(*(position - [0, self.lift]).T) - 1.0)
+
     def linear_heave(self, until: float) -> tuple[FloatArray, FloatArray]:
         """Return times [√(R/g)] and heights over the draught over the lift, of linear theory."""
         return linear_heave(until, SECTION, MASS, self.depth, self.tank_length)

@@ -63,6 +63,10 @@ class MovingCylinder(Case):
         fluid = cells[np.hypot(*cells.T) >= RADIUS]
         return join(particles(Kind.FLUID, fluid, 0.0), cylinder.particles())
 
+    def solid_height(self, position: FloatArray) -> FloatArray:
+        """Return how far points (n, 2) lie outside of the cylinder where it begins [D]."""
+        return np.asarray(np.hypot(*position.T) - RADIUS)
+
     def fluid_volume(self) -> float:
         """Return the area of the box without the cylinder."""
         return self.length * self.height - math.pi * RADIUS**2

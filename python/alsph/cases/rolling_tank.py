@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
@@ -17,6 +18,7 @@ from alsph.cases.sensors import WallSensors
 from alsph.engine.output import Output
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, lattice
+from alsph.geometry.packing import Planar
 from alsph.geometry.particles import join
 from alsph.geometry.solids import open_tank
 
@@ -108,6 +110,12 @@ class RollingTank(FreeSurface):
         tank = open_tank(-length / 2, length / 2, height, spacing, self.support_layers)
         water = self.fluid(position, np.zeros_like(position), 1 - position[:, 1])
         return join(water, tank.particles())
+
+    def solid_height(self, position: FloatArray) -> FloatArray:
+        """Return how far points (n, 2) lie outside of the walls of the tank where it begins [H]."""
+        (length, height), wall = self.size, self.support_layers * self.particle_spacing
+        outer = shapely.box(-length / 2 - wall, -wall, length / 2 + wall, height)
+        return Planar(outer - shapely.box(-length / 2, 0, length / 2, height)).height(position)
 
     @property
     def has_depth(self) -> bool:

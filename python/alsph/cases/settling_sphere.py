@@ -128,6 +128,10 @@ class SettlingSphere(Case):
         kept = (found["position"][:, :2] > 0).all(axis=1)
         return {name: values[kept] for name, values in found.items()}
 
+    def solid_height(self, position: FloatArray) -> FloatArray:
+        """Return how far points (n, 3) lie outside of the sphere where it begins [D]."""
+        return np.asarray(np.linalg.norm(position - self.centre, axis=1) - RADIUS)
+
     def measures(self, run: Record) -> list[Measure]:
         """Return the settling velocity over the last two diameters, and the drag coefficient there."""
         way, speed = (np.abs(run.history.get(f"sphere_{name}_z", np.empty(0))) for name in ("displacement", "velocity"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from alsph.analysis import averages, sampling
 from alsph.analysis.averages import Window
 from alsph.analysis.probes import Probes
-from alsph.arrays import FloatArray
+from alsph.arrays import AXES, FloatArray
 from alsph.config import Config, of_run
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
@@ -84,9 +84,31 @@ class Fields:
         index = len(self.times) - 1 if time is None else int(np.abs(self.times - time).argmin())
         found = reading.snapshot(self.path / "particles.vtkhdf", index)
         with suppress(RunFolderError):  # of a case that is not known the particles can be read all the same
-            case = self.config.case
-            return replace(found, domain=case.checked_domain, solid=case.solid_height)
+            return replace(found, domain=self.config.case.checked_domain, solid=self._solid_height(found.time))
         return found
+
+    def _solid_height(self, time: float) -> Callable[[FloatArray], FloatArray | None]:
+        """Return what tells how far points lie outside of bodies and walls, :meth:`alsph.cases.Case.solid_height`.
+
+        A body that moves, and is the only one, is taken to where it had come by that time.
+        """
+        case, history = self.config.case, {}
+        with suppress(RunFolderError):  # without it bodies are where they begin
+            history = self.history
+        axes = AXES[: case.space_dimensions]
+        bodies = case.checked_bodies
+        columns = [f"{body.name}_displacement_{axis}" for body in bodies for axis in axes]
+        if len(bodies) != 1 or columns[0] not in history:
+            return case.solid_height
+        steps = np.append(0.0, history["time"])
+        way, turn = (
+            [np.interp(time, steps, np.append(0.0, history[name])) for name in names if name in history]
+            for names in (columns, [f"{bodies[0].name}_angle"])
+        )
+        centre, angle = np.array(bodies[0].center), sum(turn)
+        back = np.eye(len(axes))
+        back[:2, :2] = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+        return lambda position: case.solid_height((position - centre - way) @ back.T + centre)
 
     @cached_property
     def probes(self) -> Probes:
