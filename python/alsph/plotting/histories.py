@@ -205,6 +205,7 @@ def _energy_budget(axes: Axes, ledger: Ledger) -> None:
     """Rate of change of the kinetic energy, and at the snapshots what it is made of."""
     if not np.isfinite(ledger.dissipation).any():
         axes.text(0.5, 0.5, "no budget: energy enters or leaves with the fluid", ha="center", transform=axes.transAxes)
+        axes.set(yticks=[], ylabel="")
         return
     axes.plot(ledger.time, ledger.energy_rate, color=PALETTE[0], lw=0.8, label="dE/dt")
     for label, values, marker, colour in (
