@@ -3,11 +3,24 @@ import json
 import numpy as np
 import pytest
 from alsph import _alsph, cases
-from alsph.cases import CASES, Body, Cylinder, FreeSurface, Sphere, TaylorGreen
+from alsph.cases import (
+    CASES,
+    Bodies,
+    Body,
+    ConfinedCylinder,
+    Cylinder,
+    FreeSurface,
+    RotatingCylinder,
+    SolidBody,
+    Sphere,
+    TaylorGreen,
+)
 from alsph.cases.base import OFFERED
+from alsph.config import Config, from_tables
 from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind
 from alsph.geometry.solids import cylinder_rings
+from alsph.study.declaration import digest
 
 
 def mirrored(points):
@@ -229,7 +242,8 @@ def test_a_case_is_shown_in_short_by_what_is_not_as_by_default():
 
 def test_what_completes_on_a_case_is_its_parameters_and_what_it_is_used_by():
     offered = {name for name in dir(Cylinder()) if not name.startswith("_")}
-    assert offered == {*Cylinder.model_fields, *OFFERED} and all(hasattr(Cylinder(), name) for name in OFFERED)
+    assert {*Cylinder.model_fields} < offered <= {*Cylinder.model_fields, *OFFERED}
+    assert {*OFFERED} <= {*dir(Body())} and "run" in offered and "outlines" not in offered
 
     class Own(Cylinder):
         """One of a user's."""
@@ -243,11 +257,11 @@ def test_what_completes_on_a_case_is_its_parameters_and_what_it_is_used_by():
     assert {*dir(cases)} == {*cases.__all__}
 
 
-CONFINED = {"length": 6.0, "height": 4.0, "upstream": 2.0, "resolution": 10, "sides": "no_slip"}
+CONFINED = {"length": 6.0, "height": 4.0, "upstream": 2.0, "resolution": 10, "side_walls": "no_slip"}
 
 
 @pytest.mark.parametrize(
-    "case", [Cylinder(**CONFINED), Cylinder(**CONFINED, offset=-0.25), Body(**CONFINED, offset=0.3)], ids=str
+    "case", [Cylinder(**CONFINED), Cylinder(**CONFINED, body_offset=-0.25), Body(**CONFINED, body_offset=0.3)], ids=str
 )
 def test_between_no_slip_sides_the_inflow_is_a_parabola_of_mean_u(case):
     state, kind = case.particles(), case.particles()["kind"]
@@ -261,11 +275,11 @@ def test_between_no_slip_sides_the_inflow_is_a_parabola_of_mean_u(case):
     assert (normal[:, 1] == -np.sign(place[:, 1])).all() and not normal[:, 0].any()
     beyond = case.buffer_columns * case.particle_spacing
     assert place[:, 0].min() < -beyond and place[:, 0].max() > case.length + beyond
-    assert [body.name for body in case.bodies()] == [*case.coefficient_bodies, "sides"]
+    assert [body.name for body in case.checked_bodies] == [*case.coefficient_bodies, "sides"]
     assert case.sliding_bodies == case.moved_bodies == case.coefficient_bodies
     solid = state["position"][(kind == Kind.SOLID) & (state["body"] == 0)]
     middle = (solid.min(axis=0) + solid.max(axis=0)) / 2
-    assert middle == pytest.approx([2.0, case.offset], abs=0.02)
+    assert middle == pytest.approx([2.0, case.centre[1]], abs=0.02)
     assert abs(case.particle_estimate() / len(kind) - 1) < 0.05
 
 
@@ -299,7 +313,7 @@ def test_surfaces_that_slide_are_the_bodys_not_the_sides():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"offset": 1.2}, "height = 4: the cylinder does not fit"),
+        ({"body_offset": 1.2}, "body_offset = 1.2: the cylinder does not fit"),
         ({"height": 4.15}, "height"),
     ],
 )
@@ -309,5 +323,60 @@ def test_an_offset_that_leaves_no_room(changes, message):
 
 
 def test_a_quarter_has_no_offset():
-    with pytest.raises(ConfigError, match="not with offset"):
-        Sphere(quarter=True, offset=0.1)
+    with pytest.raises(ConfigError, match="not with body_offset"):
+        Sphere(quarter=True, body_offset=0.1)
+
+
+def test_what_is_off_centre_or_between_no_slip_sides_has_no_reference_of_the_centred_cylinder():
+    assert Cylinder(reynolds=100)._reference() is not None
+    wide = {"reynolds": 100, "height": 60.0, "upstream": 30.0, "length": 90.0, "resolution": 8}
+    assert Cylinder(**wide)._reference() is not None
+    for case in (
+        Cylinder(reynolds=100, side_walls="no_slip"),
+        Cylinder(reynolds=100, body_offset=1.0),
+        Cylinder(**wide, body_offset=20.0),
+        ConfinedCylinder(height=5.0),
+    ):
+        assert case._reference() is None and "not validated" in " ".join(case.remarks())
+    assert RotatingCylinder(body_offset=1.0)._known("developed") == {} != RotatingCylinder()._known("developed")
+    assert ConfinedCylinder()._reference().results["Strouhal number"] == pytest.approx(0.3017, abs=1e-3)
+    assert ConfinedCylinder(reynolds=20)._reference().results["mean drag coefficient"] == 5.579535
+    assert not ConfinedCylinder().remarks()
+
+
+def test_runs_from_before_there_were_sides_are_the_same():
+    case = Cylinder(resolution=10)
+    tables = Config(case).tables()
+    assert not {"side_walls", "body_offset"} & tables.keys()
+    assert digest(Config(case)) == digest(from_tables(tables))
+
+
+def test_a_class_of_ones_own_may_have_parameters_called_sides_and_offset():
+    class Polygon(Bodies):
+        """A polygon."""
+
+        sides: int = 6
+        offset: float = 1.0
+
+        def shapes(self):
+            angle = np.arange(self.sides) * 2 * np.pi / self.sides
+            return [0.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)]
+
+    case = Polygon(resolution=10, length=6.0, height=5.0, upstream=2.0)
+    assert len(case.checked_bodies) == 1 and case.centre.tolist() == [2, 0]
+    case.simulation(threads=1).advance(1)
+
+
+def test_a_class_that_says_its_bodies_itself_may_have_no_slip_sides():
+    class Sliding(Bodies):
+        """A plate that moves along itself."""
+
+        def shapes(self):
+            return [[(-0.5, -0.25), (0.5, -0.25), (0.5, 0.25), (-0.5, 0.25)]]
+
+        def bodies(self):
+            return [SolidBody("body", tuple(self.centre), velocity=(0.1, 0.0))]
+
+    case = Sliding(**CONFINED)
+    assert [body.name for body in case.checked_bodies] == ["body", "sides"]
+    case.simulation(threads=1).advance(1)

@@ -145,7 +145,7 @@ def test_grids_in_si_are_those_in_d_and_u_times_the_factors(tmp_path, alsph):
     assert (told.time_units, plain.to_xarray().pressure.units) == ("s", "rho U^2")
     code, _, stderr = alsph("export", run.path, "--si", "--to", "csv")
     assert code == 0, stderr
-    rows = np.genfromtxt(run.path / "flow.csv", delimiter=",", names=True)
+    rows = np.genfromtxt(run.path / "flow_si.csv", delimiter=",", names=True)
     assert rows["x"].max() == pytest.approx(plain.axes["x"].max() * 0.02)
     assert np.nanmax(rows["pressure"]) == pytest.approx(np.nanmax(plain.fields["pressure"]) * 0.1)
 
@@ -169,3 +169,18 @@ def test_figures_of_a_run_with_units_say_what_they_are(tmp_path):
     run = write_flow(tmp_path / "run", case, lambda x, t: x[:, ::-1] * [1, 2], pressure=7.0)
     said = run.plot_field("pressure").get_supxlabel().replace("\n", " ")
     assert said.endswith("D = 0.02 m, U = 0.01 m/s, D/U = 2 s, ρU² = 0.1 Pa")
+
+
+def test_what_is_in_si_is_not_scaled_again_and_the_runs_own_files_stay(cylinder, alsph):
+    units = Units(length=2.0, velocity=3.0, density=5.0, kinematic_viscosity=1.0)
+    grid = cylinder.to_grid().in_si(units)
+    with pytest.raises(ConfigError, match="in SI already"):
+        grid.in_si(units)
+    with pytest.raises(ConfigError, match="a run that was given none has none"):
+        cylinder.to_grid().in_si(cylinder.units)
+    own = cylinder.path / "particles.vtkhdf"
+    before = own.read_bytes()
+    code, _, stderr = alsph("export", cylinder.path, "-o", own)
+    assert code == 2 and "a file of the run itself" in stderr and own.read_bytes() == before
+    code, _, stderr = alsph("export", cylinder.path, "-o", cylinder.path / "none" / "flow.vtkhdf")
+    assert code == 2 and "none: no such folder" in stderr

@@ -83,3 +83,35 @@ def test_the_surface_is_that_of_the_body():
 
 def test_the_labels_have_the_names_of_the_case():
     assert cases.DamBreak(resolution=10).draw().axes[0].get_xlabel() == "$x/H$"
+
+
+def test_the_command_line_draws(alsph, tmp_path):
+    target = tmp_path / "new" / "start.svg"
+    code, stdout, stderr = alsph("describe", "cylinder", "--resolution", 10, "--no-probe", "--draw", target)
+    assert (code, stdout.rstrip().endswith(str(target))) == (0, True), stderr
+    assert target.read_text().startswith("<?xml")
+    code, stdout, _ = alsph("describe", "cylinder", "--resolution", 10, "--no-probe", "--draw", tmp_path / "start")
+    assert (code, stdout.rstrip().endswith(str(tmp_path / "start.png"))) == (0, True)
+
+
+@pytest.mark.parametrize("target", ["", ".", "/", "start.docx"])
+def test_a_picture_goes_to_a_file(alsph, target):
+    code, _, stderr = alsph("describe", "cylinder", "--resolution", 10, "--no-probe", "--draw", target)
+    assert code == 2 and "--draw = " in stderr and "must be a file that ends in png, pdf, svg" in stderr
+
+
+def test_a_body_that_is_refused_is_drawn_all_the_same(alsph, tmp_path):
+    target = tmp_path / "thin.png"
+    words = ["--shape", "naca0012", "--resolution", 10, "--no-probe", "--draw", target]
+    code, _, stderr = alsph("describe", "body", *words)
+    assert code == 2 and "too thin" in stderr and target.stat().st_size > 5_000
+    case = Body(shape="naca0012", resolution=10)
+    figure = case.draw()
+    assert not sum(circles(figure.axes[0])) and len(figure.axes[1].lines) >= 1
+
+
+def test_points_off_the_plane_are_not_drawn_on_it():
+    case = cases.Sphere(resolution=8, length=5.0, height=4.0, width=4.0, upstream=2.0)
+    figure = plotting.start(case, points=np.array([[3.0, 0.5, 0.0], [3.0, 1.0, 1.5]]))
+    (marked,) = [line.get_xydata().tolist() for line in figure.axes[0].lines if line.get_marker() == "+"]
+    assert marked == [[3.0, 0.5]]

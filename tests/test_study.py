@@ -1,6 +1,7 @@
 """Parameter studies: declaration, caching, interruption, and clusters."""
 
 import csv
+import io
 import json
 import os
 import signal
@@ -17,9 +18,11 @@ from alsph import study
 from alsph.cases import Couette, Cylinder, TaylorGreen
 from alsph.errors import ConfigError, WalltimeError
 from alsph.study import Figure, Study, Sweep
+from alsph.study.board import Board
 from alsph.study.execution import _jobs
 from alsph.study.results import names
-from alsph.study.state import RUNS, state
+from alsph.study.state import RUNS, State, state
+from rich.console import Console
 
 DECAY = "decay rate of the kinetic energy, U/D"
 VORTEX = {"case": "taylor_green", "resolution": 16, "run": {"until": 0.2, "output_interval": 0.1}}
@@ -497,3 +500,20 @@ def test_remarks_on_a_run_stand_beside_its_results(tmp_path):
         assert [row["remarks"] for row in csv.DictReader(file)] == [row.get("remarks", "") for row in results.rows]
     assert "remarks" in results.to_markdown()
     assert "kernel: 1 of 2 runs" in results.draw()["decay"].get_supxlabel()
+
+
+@pytest.mark.parametrize("width", [50, 80, 160])
+def test_the_live_board_fits_its_terminal_and_says_what_went_wrong(width, tmp_path):
+    declared = study.load("time-step")
+    points = declared.points()[:4]
+    board = Board(declared, points, tmp_path, enabled=False)
+    board.console = Console(width=width, height=30, file=io.StringIO(), force_terminal=True, color_system=None)
+    message = "broke down at step 7: the time step is above the limit of stability"
+    found = {point.name: State("running", time=2.0) for point in points} | {
+        points[1].name: State("failed", message=message)
+    }
+    board.console.print(board._table(found, board.start + 10))
+    lines = board.console.file.getvalue().splitlines()
+    assert max(map(len, lines)) <= width
+    assert "t* 2.00 of 30  ETA ?" in lines[0] and lines[1].startswith("failed ")
+    assert message.replace(" ", "") in "".join(lines).replace(" ", "")

@@ -227,12 +227,19 @@ def test_a_case_of_ones_own_is_validated_at_its_own_resolution_or_those_given(al
     assert (code, "run 2 of 2: gauged, resolution 12" in stdout, "All well: 1 of 1" in stdout) == (0, True, True)
 
 
-def test_a_case_in_neither_suite_has_an_entry_of_its_own():
-    (entry,) = validation._chosen(["cylinder_pair"], False, None)
-    case = entry.model()
-    assert (entry.resolutions, entry.until) == ((case.resolution,), case.default_until)
-    suites = {entry.case for entry in (*validation.QUICK, *validation.FULL)}
-    assert "cylinder_pair" not in suites
+def test_cases_that_cannot_be_validated(tmp_path):
+    with pytest.raises(ConfigError, match="cylinder_pair: in no suite, it has no reference; alsph run"):
+        validate("cylinder_pair", output=tmp_path / "out")
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "own.py").write_text(OWN)
+    one, two = (f"{tmp_path}/{folder}/own.py:Gauged" for folder in ("one", "two"))
+    with pytest.raises(ConfigError, match="there is a case 'gauged' before it"):
+        validate(one, two, output=tmp_path / "out")
+    (entry,) = validation._chosen([one, one], False, None)
+    model = entry.model
+    (tmp_path / "one" / "own.py").unlink()
+    assert entry.model is model and entry.file_name == "gauged"  # the file is read once
 
 
 def test_completion_offers_what_validate_takes():

@@ -52,8 +52,9 @@ OFFERED = (
     *("particles", "particle_spacing", "particle_estimate", "memory", "fluid_volume", "domain", "bodies"),
     *("kinematic_viscosity", "cell_reynolds", "boundary_layer", "reference_area", "validated"),
     *("default_until", "expected_time_step", "time_step_limits"),
+    *("shapes", "outlines", "carried", "bounds", "centre", "chord", "moment_point", "thickness", "blockage"),
 )
-"""What a case is used by, beside its parameters; the rest is for who writes one."""
+"""What a case is used by, beside its parameters, as far as it has it; the rest is for who writes one."""
 
 
 class Case(Discretised):

@@ -39,7 +39,7 @@ class Bodies(Channel):
     def shapes(self) -> list[Any]:
         """Return the outline of each body, an array of points (n, 2) or a polygon of shapely.
 
-        Lengths are in D, and the origin is the point (upstream, offset) of the channel.
+        Lengths are in D, and the origin is the point (upstream, body_offset) of the channel.
         """
 
     @cached_property
@@ -54,7 +54,8 @@ class Bodies(Channel):
     @model_validator(mode="after")
     def _fits_in(self) -> Self:
         left, bottom, right, top = self.outline.bounds
-        below, above = self.height / 2 + self.offset, self.height / 2 - self.offset
+        _, lifted = self.centre
+        below, above = self.height / 2 + lifted, self.height / 2 - lifted
         room = min(self.upstream + left, self.length - self.upstream - right, bottom + below, above - top)
         if room < 0.5:
             one = len(self.outlines) == 1
@@ -137,7 +138,7 @@ class Bodies(Channel):
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Left, bottom, right and top of the bodies, relative to the point (upstream, 0) [D]."""
+        """Left, bottom, right and top of the bodies, relative to the point (upstream, body_offset) [D]."""
         left, bottom, right, top = self.outline.bounds
         return left, bottom, right, top
 

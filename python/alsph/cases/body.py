@@ -28,9 +28,9 @@ class Body(Bodies):
     D is the side of the square, the chord of the airfoil, the unit of the file's lengths, or the larger extent of a
     drawing; `scale` multiplies them. A file holds points, two numbers a line, in any of the usual orders and forms, or
     is a drawing (SVG, DXF, GeoJSON); several closed curves are several bodies, and one within another is a hole, which
-    fluid fills. The centroid, that of all of them together, lies at (upstream, 0). The solid particles follow the
-    surface. What is thinner than 2 Δx, such as a sharp trailing edge, is cut off (:attr:`carried`), and holes narrower
-    than 4 Δx are filled; a body of which less than half is left is refused.
+    fluid fills. The centroid, that of all of them together, lies at (upstream, body_offset). The solid particles follow
+    the surface. What is thinner than 2 Δx, such as a sharp trailing edge, is cut off (:attr:`carried`), and holes
+    narrower than 4 Δx are filled; a body of which less than half is left is refused.
     Forces are formed with D; moments with the chord c, the body's extent along x before it is turned, about c/4.
     """
 

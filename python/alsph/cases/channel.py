@@ -1,9 +1,10 @@
-"""What the cases of a body in a channel share: inlet, outlet, free-slip walls, the flow at the start, the forces."""
+"""What the cases of a body in a channel share: inlet, outlet, sides, the flow at the start, the forces."""
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from functools import cached_property
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -25,8 +26,8 @@ from alsph.reference import Reference
 SIDES = "sides"
 """Name of the sides that do not let slip, among the bodies."""
 
-ROUND = 1.5
-"""Largest velocity over that of the inflow where it goes round a body."""
+PARABOLA = 1.5
+"""Largest velocity of the parabola over its mean."""
 
 
 class Channel(Case):
@@ -36,7 +37,7 @@ class Channel(Case):
     inflow is the parabola of developed flow, and U its mean.
     """
 
-    velocity_max: ClassVar[float] = ROUND
+    velocity_max: ClassVar[float] = 1.5
     of_the_start: ClassVar[tuple[str, ...]] = ("perturbation",)
     body_name: ClassVar[str]
     across: ClassVar[tuple[str, ...]] = ("height",)
@@ -47,10 +48,13 @@ class Channel(Case):
     length: float = Field(default=14.0, gt=0, description="length of the channel [D]")
     height: float = Field(default=13.0, gt=0, description="height of the channel [D]")
     upstream: float = Field(default=4.0, gt=0, description="distance from the inlet to the centre of the body [D]")
-    offset: float = Field(default=0.0, description="how far the centre of the body lies above the centre line [D]")
-    sides: Literal["slip", "no_slip"] = Field(
-        default="slip",
-        description="sides of the channel: with slip and a uniform inflow U, or without and the parabola of mean U",
+    body_offset: float | None = Field(
+        default=None, description="how far the centre of the body lies above the centre line, 0 if not given [D]"
+    )
+    side_walls: Literal["slip", "no_slip"] | None = Field(
+        default=None,
+        description="sides of the channel: slip, with a uniform inflow U, or no_slip, with the parabola of mean U; "
+        "slip if not given",
     )
     perturbation: float = Field(
         default=0.1,
@@ -69,14 +73,14 @@ class Channel(Case):
     @model_validator(mode="after")
     def _fits(self) -> Self:
         room = {name: getattr(self, name) / 2 for name in self.across}
-        room["height"] -= abs(self.offset)
+        room["height"] -= abs(self.centre[1])
         for name, left in (room | {"upstream": self.upstream, "length": self.length - self.upstream}).items():
             if left < 1:
-                known = ", ".join(
-                    f"{each} {getattr(self, each):g}" for each in ("length", *self.across, "upstream", "offset")
-                )
+                of = "body_offset" if name == "height" and self.body_offset else name
+                told = [each for each in ("length", *self.across, "upstream", "body_offset") if getattr(self, each)]
+                known = ", ".join(f"{each} {getattr(self, each):g}" for each in told)
                 raise ValueError(
-                    f"{name} = {getattr(self, name):g}: the {self.body_name} does not fit; leave at least 1 D from "
+                    f"{of} = {getattr(self, of):g}: the {self.body_name} does not fit; leave at least 1 D from "
                     f"centre to each side ({known})"
                 )
         for name in ("length", *self.across):
@@ -84,9 +88,14 @@ class Channel(Case):
         return self
 
     @property
+    def is_confined(self) -> bool:
+        """Whether the sides of the channel do not let slip."""
+        return self.side_walls == "no_slip"
+
+    @property
     def expected_velocity(self) -> float:
         """Largest velocity that is expected [U]: the parabola's is half as much again as its mean."""
-        return self.velocity_max * (1.5 if self.sides == "no_slip" else 1.0)
+        return self.velocity_max * (PARABOLA if self.is_confined else 1.0)
 
     @property
     def section(self) -> FloatArray:
@@ -125,7 +134,7 @@ class Channel(Case):
         """Return what is to be said of the resolution, the method and the channel."""
         behind = self.length - self.upstream - self.bounds[2]
         # Who asks for sides that hold the fluid wants them near.
-        near = (self.blockage, self.slowed) if self.sides == "slip" else (0.0, 0.0)
+        near = (0.0, 0.0) if self.is_confined else (self.blockage, self.slowed)
         return [*super().remarks(), *remarks.channel(self.blocked, self.upstream, behind, *near)]
 
     @property
@@ -152,24 +161,29 @@ class Channel(Case):
     @property
     def centre(self) -> FloatArray:
         """Centre of the body (d,) [D]."""
-        return np.array([self.upstream, self.offset, *0 * self.section[1:]])
+        return np.array([self.upstream, self.body_offset or 0.0, *0 * self.section[1:]])
 
     def domain(self) -> Domain:
         """Return the channel: inlet at x = 0, outlet at x = length, its sides at y = ± height/2 and z alike."""
         half = self.section / 2
-        side: Boundary = "slip" if self.sides == "slip" else "none"
+        side: Boundary = "none" if self.is_confined else "slip"
         walls: list[tuple[Boundary, Boundary]] = [(side, side)] * len(half)
         return Domain((0, *-half), (self.length, *half), [("inlet", "outlet"), *walls])
 
     def bodies(self) -> list[SolidBody]:
-        """Return the bodies and sides that do not let slip, at rest; their torques are about the centre."""
-        names = [*self.coefficient_bodies, *([SIDES] if self.sides == "no_slip" else [])]
-        return [SolidBody(name, tuple(self.centre)) for name in names]
+        """Return the bodies, at rest; their torques are about the centre."""
+        return [SolidBody(name, tuple(self.centre)) for name in self.coefficient_bodies]
+
+    @cached_property
+    def checked_bodies(self) -> list[SolidBody]:
+        """The bodies, and sides that do not let slip, at rest."""
+        sides = [SolidBody(SIDES, tuple(self.centre))] if self.is_confined else []
+        return [*(SolidBody.of(body) for body in self.bodies()), *sides]
 
     @property
     def sliding_bodies(self) -> list[str]:
         """Names of the bodies whose surface may slide: those in place, without the sides."""
-        return [name for name in super().sliding_bodies if name != SIDES]
+        return [name for name in super().sliding_bodies if name != SIDES or not self.is_confined]
 
     def particles(self) -> dict[str, NDArray[Any]]:
         """Return a uniform lattice around the body's solid particles, impulsively started."""
@@ -184,12 +198,12 @@ class Channel(Case):
             particles(Kind.INLET, before, self._stream(before)),
             particles(Kind.OUTLET, behind, self._stream(behind)),
             *(solid.particles(body=index) for index, solid in enumerate(solids)),
-            *(side.particles(body=len(solids)) for side in self._sides()),
+            *(side.particles(body=len(self.checked_bodies) - 1) for side in self._sides()),
         )
 
     def _sides(self) -> list[Solid]:
         """Return the layers of sides that do not let slip, which go on beyond the buffers; none of others."""
-        if self.sides == "slip":
+        if not self.is_confined:
             return []
         spacing = self.particle_spacing
         beyond = self.buffer_columns + self.support_layers
@@ -201,13 +215,13 @@ class Channel(Case):
 
     def _stream(self, position: FloatArray) -> FloatArray:
         """Return the undisturbed flow at positions (n, d): U, or the parabola of that mean."""
-        if self.sides == "no_slip":
+        if self.is_confined:
             return parabola(0.5 + position[:, 1] / self.height, np.ones(len(position)))
         return np.broadcast_to(np.eye(self.space_dimensions)[0], position.shape)
 
     def _within_sides(self, height: FloatArray, position: FloatArray) -> FloatArray:
         """Return how far points (n, d) lie outside of bodies, given it (n,), and of sides that do not let slip [D]."""
-        if self.sides == "slip":
+        if not self.is_confined:
             return height
         return np.asarray(np.minimum(height, self.height / 2 - np.abs(position[:, 1])))
 
@@ -235,5 +249,7 @@ class Channel(Case):
         """Return the stream and a Gaussian vortex (divergence-free) about the body, fastest 0.6 D from its centre."""
         x, y, *z = ((position - self.centre) / 0.6).T
         swirl = self.perturbation * np.exp(0.5 * (1 - x**2 - y**2 - sum(each**2 for each in z)))
+        if self.is_confined:  # it vanishes at the sides
+            swirl = swirl * (1 - (2 * position[:, 1] / self.height) ** 2)
         about = np.stack([-swirl * y, swirl * x, *(0 * each for each in z)], axis=1)
         return np.asarray(self._stream(position) + about)

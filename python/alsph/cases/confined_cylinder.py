@@ -13,7 +13,7 @@ from alsph.analysis.record import Record
 from alsph.cases.cylinder import Cylinder
 from alsph.reference import Reference
 
-CHANNEL = {"length": "L_over_D", "height": "H_over_D", "upstream": "LU_over_D", "offset": "offset_over_D"}
+CHANNEL = {"length": "L_over_D", "height": "H_over_D", "upstream": "LU_over_D", "body_offset": "offset_over_D"}
 """Parameters that the channel of a reference is told by, and their columns."""
 
 
@@ -33,8 +33,10 @@ class ConfinedCylinder(Cylinder):
     length: float = Field(default=22.0, gt=0, description="length of the channel [D]")
     height: float = Field(default=4.1, gt=0, description="height of the channel [D]")
     upstream: float = Field(default=2.0, gt=0, description="distance from the inlet to the centre of the body [D]")
-    offset: float = Field(default=-0.05, description="how far the centre of the body lies above the centre line [D]")
-    sides: Literal["no_slip"] = Field(default="no_slip", description="sides of the channel: without slip")
+    body_offset: float = Field(
+        default=-0.05, description="how far the centre of the body lies above the centre line [D]"
+    )
+    side_walls: Literal["no_slip"] = Field(default="no_slip", description="sides of the channel: no_slip")
 
     @property
     def validated(self) -> tuple[float, float, int]:

@@ -14,7 +14,7 @@ from alsph.cases.bodies import Bodies
 class CylinderPair(Bodies):
     """Flow past two equal cylinders of diameter D in a channel with free-slip walls and uniform inflow U.
 
-    The first, ``body_1``, is the one upstream or below; the point (upstream, 0) lies midway between them. Loads are
+    The first, ``body_1``, is the one upstream or below; (upstream, body_offset) lies midway between them. Loads are
     those of both together, and of each.
     """
 

@@ -42,7 +42,9 @@ class RotatingCylinder(Cylinder):
     perturbation: float = Field(
         default=0.0, ge=0, le=1, description="largest velocity of an initial vortex about the body [U]"
     )
-    sides: Literal["slip"] = Field(default="slip", description="sides of the channel: with slip and a uniform inflow U")
+    side_walls: Literal["slip"] | None = Field(
+        default=None, description="sides of the channel: slip, with a uniform inflow U; slip if not given"
+    )
     surface_speed: float = Field(
         default=1.0, ge=-4, le=4, description="speed of the surface, counterclockwise where positive [U]"
     )
@@ -102,6 +104,8 @@ class RotatingCylinder(Cylinder):
 
     def _known(self, flow: str) -> dict[str, float]:
         """Return what is known of the flow soon after the start, or of the one that has developed; empty if nothing."""
+        if self.body_offset:
+            return {}
         given = (self.reynolds, abs(self.surface_speed), self.length, self.height, self.upstream)
         mirrored = math.copysign(1.0, self.surface_speed)
         for row in reference.rows("rotating_cylinder.csv"):

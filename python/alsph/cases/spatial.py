@@ -45,7 +45,9 @@ class Spatial(Channel):
         le=1,
         description="largest velocity of an initial vortex about the body that starts shedding; 0: symmetric [U]",
     )
-    sides: Literal["slip"] = Field(default="slip", description="sides of the channel: with slip and a uniform inflow U")
+    side_walls: Literal["slip"] | None = Field(
+        default=None, description="sides of the channel: slip, with a uniform inflow U; slip if not given"
+    )
     quarter: bool = Field(
         default=False,
         description="compute a quarter of the flow, y and z above 0, for flows that are symmetric in both; forces are "
@@ -65,8 +67,9 @@ class Spatial(Channel):
     def _is_symmetric(self) -> Self:
         if self.quarter and len(self._volume.flips) < 2:
             raise ValueError(f"quarter = true: the {self.body_name} is not its own mirror image in y and in z")
-        if self.quarter and self.offset:
-            raise ValueError(f"quarter = true: not with offset = {self.offset:g}, which leaves the flow no symmetry")
+        if self.quarter and self.body_offset:
+            told = f"body_offset = {self.body_offset:g}"
+            raise ValueError(f"quarter = true: not with {told}, which leaves the flow no symmetry")
         return self
 
     @cached_property

@@ -18,6 +18,10 @@ from alsph.cli.options import Given, group_of_cases
 from alsph.cli.terminal import say, say_run, say_table
 from alsph.errors import ConfigError
 from alsph.running.control import Control, seconds_of
+from alsph.text import shown
+
+KINDS = ("png", "pdf", "svg")
+"""Formats of pictures."""
 
 DPI = 150
 """Pixels an inch of the picture of a start."""
@@ -48,11 +52,26 @@ def _describe(
 ) -> None:
     from alsph.running.describe import describe, starting
 
-    state = starting(given.config)
-    if draw:
-        figure = alsph.plotting.start(given.config.case, state, given.config.probes)
-        alsph.plotting.save(figure, draw, dpi=DPI)
+    target, case, state = _picture(draw), given.config.case, None
+    try:
+        state = starting(given.config)
+    finally:  # bodies that are refused are drawn all the same
+        if target and (state or isinstance(case, cases.Bodies)):
+            alsph.plotting.save(alsph.plotting.start(case, state, given.config.probes), target, dpi=DPI)
     say_table(describe(given.config, state, probe=probe))
+    if target:
+        say(f"\n{target}")
+
+
+def _picture(path: Path | None) -> Path | None:
+    """Return the file that a picture goes to, whose folder is there."""
+    if path is None:
+        return None
+    given, path = path, path if path.suffix or not path.name else path.with_name(f"{path.name}.png")
+    if given.is_dir() or path.suffix[1:].lower() not in KINDS:
+        raise ConfigError(f"--draw = {shown(str(given))}: must be a file that ends in {', '.join(KINDS)}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path
 
 
 def _autotune(

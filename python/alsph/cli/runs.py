@@ -29,6 +29,9 @@ DERIVED = FIELDS[4:]
 GRIDS = ("vtkhdf", "netcdf", "csv")
 """What alsph.plotting and alsph.results.export, which help need not wait for, know by these names."""
 
+FEW = 20
+"""Pictures of a film below which it is told how to have more."""
+
 app = App()
 
 
@@ -246,7 +249,9 @@ def _animate(
         given = {what: value for what, value in chosen.items() if value is not None}
         film = run.animate(name, output, every=every, fps=fps, progress=progress, **given)
     say(film)
-    complain(f"{pictures} pictures, {pictures / fps:.3g} s; a run with a smaller --output-interval has more")
+    if pictures < FEW and every == 1:
+        told = f"{pictures} pictures, {pictures / fps:.3g} s"
+        complain(f"{told}; a run writes more with a smaller --output-interval", "yellow")
 
 
 @app.command("export")
@@ -283,16 +288,18 @@ def _export(
     if output and to and output.suffix != FORMATS[to]:
         raise ConfigError(f"{output}: a file in the format {to} ends in {FORMATS[to]}")
     run = alsph.Run(path)
-    if si and run.units is None:
+    units, suffix = (run.units, "_si") if si else (None, "")
+    if si and units is None:
         raise ConfigError(f"--si: {path} does not know its units; give them to the run, --units-length and so on")
     if probes:
-        if extra := [name for name, given in (("time", time), ("spacing", spacing), ("field", field)) if given]:
+        of_fields = {"to": to, "time": time, "spacing": spacing, "field": field or None}
+        if extra := [name for name, given in of_fields.items() if given is not None]:
             raise ConfigError(f"--probes: not with --{extra[0]}, which is of the fields")
-        say(save_probes(run.probes, output or path / "probes.csv", run.units if si else None))
+        say(save_probes(run.probes, output or path / f"probes{suffix}.csv", units))
         return
     grid = run.to_grid(time, spacing, derived=field or [])
     if time is not None:
         complain(f"fields at t* = {grid.time:.6g}, the output nearest to {time:g}")
-    if si and run.units:
-        grid = grid.in_si(run.units)
-    say(grid.save(output or path / f"flow{FORMATS[to or 'vtkhdf']}"))
+    if units:
+        grid = grid.in_si(units)
+    say(grid.save(output or path / f"flow{suffix}{FORMATS[to or 'vtkhdf']}"))

@@ -121,7 +121,7 @@ def _validate(
 ) -> None:
     """Run cases at several resolutions and compare them with their references.
 
-    A case of one's own, or one that is in neither suite, is run at its own resolution, or at those of --resolution.
+    A case of one's own, FILE.py:CLASS, is run at its own resolution, or at those of --resolution.
     The exit code is 1 if a check fails. Runs are kept in the output folder and used again; a validation that was cut
     goes on when it is started again.
     """

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from alsph.arrays import AXES, FloatArray
 from alsph.cases import Bodies, Case, remarks
-from alsph.geometry.particles import Kind
+from alsph.geometry.particles import Kind, particles
 from alsph.geometry.plane import Plane
 from alsph.plotting.style import PALETTE, blank, rename
 
@@ -114,7 +114,8 @@ class Setup:
 def start(case: Case, state: State | None = None, points: FloatArray | None = None) -> Figure:
     """Picture of what a run starts with: particles, outlines, the thinnest part, sides and recorded points.
 
-    In 3-D it is of the slice that pictures of the run show.
+    In 3-D it is of the slice that pictures of the run show. Bodies that are too thin for the resolution are drawn
+    without particles.
 
     Parameters
     ----------
@@ -134,11 +135,18 @@ def start(case: Case, state: State | None = None, points: FloatArray | None = No
         cut = Plane.of(case.picture_axis, case.middle)
         plane, where = (cut.across[0], cut.across[1]), f", ${AXES[cut.axis]}/D$ = {cut.place:.3g}"
     figure = _draw_all(
-        _found(case, state or case.build().state, points, plane),
+        _found(case, state or _particles(case), points, plane),
         f"{case.name}, Re = {case.reynolds:g}, D/Δx = {case.resolution}{where}",
     )
     rename(figure, case.symbols)
     return figure
+
+
+def _particles(case: Case) -> State:
+    """Return the particles that a case starts with; none of one whose bodies are too thin."""
+    if isinstance(case, Bodies) and remarks.refusal(case.remarks()):
+        return particles(Kind.FLUID, np.empty((0, 2)), 0.0)
+    return case.build().state
 
 
 def _found(case: Case, state: State, points: FloatArray | None, plane: tuple[int, int]) -> Setup:
@@ -146,6 +154,8 @@ def _found(case: Case, state: State, points: FloatArray | None, plane: tuple[int
     for axis in set(range(case.space_dimensions)) - set(plane):
         near = np.abs(state["position"][:, axis] - case.middle[axis]) <= case.particle_spacing
         state = {name: values[near] for name, values in state.items()}
+        if points is not None:
+            points = points[np.abs(points[:, axis] - case.middle[axis]) <= case.particle_spacing]
     view = _extent(case, state, plane)
     return Setup(
         case.checked_domain,
@@ -164,6 +174,9 @@ def _found(case: Case, state: State, points: FloatArray | None, plane: tuple[int
 
 def _extent(case: Case, state: State, plane: tuple[int, int]) -> View | None:
     """Return what the bodies that forces are those of extend over; None if there are none."""
+    if isinstance(case, Bodies):
+        left, bottom, right, top = np.array(case.bounds) + np.tile(case.centre, 2)
+        return float(left), float(right), float(bottom), float(top)
     named = [index for index, body in enumerate(case.checked_bodies) if body.name in case.coefficient_bodies]
     solid = state["position"][(state["kind"] == Kind.SOLID) & np.isin(state["body"], named)][:, plane]
     if not len(solid):
@@ -202,7 +215,8 @@ def _thinnest(case: Bodies) -> tuple[FloatArray, str] | None:
     if thickness > 0.99 * remarks.THICK:
         return None
     tip = shapely.Point(remarks.thinnest_tip(case.outline, spacing))
-    there = shapely.shortest_line(shapely.union_all(case.carried), tip).coords[0]
+    left = shapely.union_all(case.carried)
+    there = tip.coords[0] if left.is_empty else shapely.shortest_line(left, tip).coords[0]
     return np.array(there) + case.centre, f"thinnest part: {f'{thickness:.3g} Δx' if thickness > 0.01 else 'an edge'}"
 
 

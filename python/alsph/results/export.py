@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
@@ -18,13 +19,14 @@ from alsph.arrays import AXES, FloatArray
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import vtkhdf
 from alsph.folder.durable import check_target, replacing
+from alsph.folder.run_folder import OWN
 from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_counts, cell_middles, lattice
 from alsph.geometry.particles import Snapshot
 from alsph.parameters import choose
 from alsph.symbols import GENERAL, Symbols
 from alsph.text import shown
-from alsph.units import Quantity, Units
+from alsph.units import QUANTITIES, Quantity, Units
 
 if TYPE_CHECKING:
     import pandas
@@ -36,15 +38,18 @@ MOST_POINTS, LARGEST = 20_000_000, 1e15
 FORMATS = {"vtkhdf": ".vtkhdf", "netcdf": ".nc", "csv": ".csv"}
 """Formats of grids, and how their files end."""
 UNITS = {"velocity": "U", "pressure": "rho U^2", "vorticity": "U/D", **dict.fromkeys(DERIVED, "U^2/D^2")}
-IN_SI: dict[str, tuple[Quantity, int, str]] = {
-    "time": ("time", 1, "s"),
-    "length": ("length", 1, "m"),
-    "velocity": ("velocity", 1, "m/s"),
-    "pressure": ("pressure", 1, "Pa"),
-    "vorticity": ("rate", 1, "1/s"),
-    **dict.fromkeys(DERIVED, ("rate", 2, "1/s^2")),
+IN_SI: dict[str, tuple[Quantity, int]] = {
+    "time": ("time", 1),
+    "length": ("length", 1),
+    "velocity": ("velocity", 1),
+    "pressure": ("pressure", 1),
+    "vorticity": ("rate", 1),
+    **dict.fromkeys(DERIVED, ("rate", 2)),
 }
-"""Quantity of each field, its exponent, and the unit in SI."""
+"""Quantity of each field, and its exponent."""
+
+EXPORTED = re.compile(r"(flow(_si)?\.(vtkhdf|nc|csv))|(probes(_si)?\.csv)")
+"""Files of a run folder that may be written again."""
 
 
 def table(history: dict[str, FloatArray]) -> pandas.DataFrame:
@@ -86,7 +91,13 @@ class Grid:
         ----------
         units : Units
             What D, U and ρ are, as ``run.units``.
+
+        Raises
+        ------
+        ConfigError
+            If it is so already, or there are no units.
         """
+        _check_units(self.si, units)
         return replace(
             self,
             time=self.time * _factor("time", units),
@@ -124,7 +135,7 @@ class Grid:
         write = {".vtkhdf": self._write_image, ".nc": self._write_netcdf, ".csv": self._write_csv}
         if path.suffix not in write:
             raise ConfigError(f"{path}: a grid is written to a file that ends in {', '.join(write)}")
-        check_target(path)
+        _check(path)
         with replacing(path) as temporary:
             write[path.suffix](temporary)
         return path
@@ -179,7 +190,13 @@ class PlaneRecord:
         ----------
         units : Units
             What D, U and ρ are, as ``run.units``.
+
+        Raises
+        ------
+        ConfigError
+            If it is so already, or there are no units.
         """
+        _check_units(self.si, units)
         length = _factor("length", units)
         return replace(
             self,
@@ -265,10 +282,19 @@ def save_probes(found: Probes, path: str | Path, units: Units | None = None) -> 
     if units:
         of = {name: "length" for name in AXES} | {name: name.partition("_")[0] for name in columns if name not in AXES}
         columns = {name: values * _factor(of[name], units) for name, values in columns.items()}
-    check_target(path)
+    _check(path)
     with replacing(path) as temporary:
         _write_columns(columns, temporary)
     return path
+
+
+def _check(path: Path) -> None:
+    """Refuse a file that cannot be written, or that a run needs."""
+    if not path.parent.is_dir():
+        raise RunFolderError(f"{path.parent}: no such folder")
+    if (path.parent / "run.json").is_file() and OWN.fullmatch(path.name) and not EXPORTED.fullmatch(path.name):
+        raise RunFolderError(f"{path}: a file of the run itself; choose another name")
+    check_target(path)
 
 
 def _write_columns(columns: dict[str, FloatArray], path: Path) -> None:
@@ -276,16 +302,26 @@ def _write_columns(columns: dict[str, FloatArray], path: Path) -> None:
     np.savetxt(path, rows, "%.9g", ",", header=",".join(columns), comments="")
 
 
+def _check_units(si: bool, units: Units | None) -> None:
+    """Refuse what is in SI already, or has no units to be put into it."""
+    if si:
+        raise ConfigError("in_si: it is in SI already")
+    if not isinstance(units, Units):
+        raise ConfigError(f"in_si: units = {shown(units)}: must be alsph.Units; a run that was given none has none")
+
+
 def _factor(field: str, units: Units) -> float:
     """Return what one unit of a field, or of a time or length, is in SI."""
-    quantity, power, _ = IN_SI[field]
+    quantity, power = IN_SI[field]
     return units.factor(quantity) ** power
 
 
 def _unit(field: str, symbols: Symbols, si: bool) -> str:
     """Return the unit of a field, or of a time or length."""
     if si:
-        return IN_SI[field][2]
+        quantity, power = IN_SI[field]
+        unit = QUANTITIES[quantity][0]
+        return unit if power == 1 else f"{unit}^{power}"
     return symbols(UNITS[field]) if field in UNITS else symbols.time if field == "time" else symbols.length
 
 

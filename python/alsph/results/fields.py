@@ -92,13 +92,15 @@ class Fields:
 
         A body that moves, and is the only one, is taken to where it had come by that time.
         """
-        case, history = self.config.case, {}
-        with suppress(RunFolderError):  # without it bodies are where they begin
+        case, bodies = self.config.case, self.config.case.checked_bodies
+        if len(bodies) != 1 or not (bodies[0].moves or bodies[0].rigid or "motion" in case.rules):
+            return case.solid_height
+        history: dict[str, FloatArray] = {}
+        with suppress(RunFolderError):  # without it the body is where it begins
             history = self.history
         axes = AXES[: case.space_dimensions]
-        bodies = case.checked_bodies
-        columns = [f"{body.name}_displacement_{axis}" for body in bodies for axis in axes]
-        if len(bodies) != 1 or columns[0] not in history:
+        columns = [f"{bodies[0].name}_displacement_{axis}" for axis in axes]
+        if columns[0] not in history:
             return case.solid_height
         steps = np.append(0.0, history["time"])
         way, turn = (

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Callable
-from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from types import ModuleType
@@ -209,9 +208,6 @@ class Run(Loads):
         if np.isfinite(self.config.case.expected_penalty_constant()):
             waves = "" if self.config.case.is_weakly_compressible else " of the penalty"
             results[f"artificial Mach number{waves}"] = Estimate(mach_number(self.history))
-        with suppress(RunFolderError):  # of a file that is damaged, whose run has results all the same
-            if len(self.probes.time):
-                results["probes"] = f"{len(self.probes.position)} points, {len(self.probes.time)} times"
         for measure in self.measures:
             value = measure.value if isinstance(measure.value, Estimate) else Estimate(measure.value)
             told = np.isnan(value) and value.note == self.window.rule

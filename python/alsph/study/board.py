@@ -82,26 +82,27 @@ class Board:
             self.say(self._total(found, now))
 
     def _table(self, found: Mapping[str, State], now: float) -> Group:
-        """Return a row for each run, whose label is cut where the terminal has no room for it, and the total."""
+        """Return a row for each run, its label cut where there is no room for it, what went wrong, and the total."""
         table = Table.grid(padding=(0, 2), expand=True)
         for ratio in (None, 1, None):
             table.add_column(no_wrap=True, overflow="ellipsis", ratio=ratio)
         shown = self.points if len(self.points) <= self.console.height - 4 else self._lively(found)
         for point in shown:
             table.add_row(*(Text(printable(cell)) for cell in self._cells(point, found[point.name], now)))
-        return Group(table, Text(printable(self._total(found, now)), overflow="fold"))
+        failed = [point for point in shown if found[point.name].status == "failed"]
+        reasons = [f"{point.label}: {found[point.name].message}" for point in failed]
+        return Group(table, *(Text(printable(line), overflow="fold") for line in (*reasons, self._total(found, now))))
 
     def _lively(self, found: Mapping[str, State]) -> list[Point]:
         """Return the runs that are going on or have failed, where the screen does not hold all."""
         return [point for point in self.points if found[point.name].status in ("running", "failed")]
 
     def _cells(self, point: Point, state: State, now: float) -> tuple[str, str, str]:
-        """Return the status of a run, its label, with what went wrong, and how far it is."""
-        label = f"{point.label}  {state.message}" if state.status == "failed" else point.label
+        """Return the status of a run, its label, and how far it is."""
         if state.status != "running":
-            return state.status, label, ""
+            return state.status, point.label, ""
         reached = f"t* {state.time:.2f} of {point.config.until_in_words}  ETA {self._left(point, state, now)}"
-        return state.status, label, reached
+        return state.status, point.label, reached
 
     def _left(self, point: Point, state: State, now: float) -> str:
         time, seen = self.first.get(point.name, (state.time, now))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,9 +57,9 @@ class Entry:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     continued: float | None = None
 
-    @property
+    @cached_property
     def model(self) -> type[cases.Case]:
-        """The case."""
+        """The case, as its file is when it is first asked for."""
         return cases.find(self.case)
 
     @property
@@ -177,15 +178,14 @@ class Row:
     def cells(self) -> tuple[str, ...]:
         """The row of the report's table."""
         measure = self.measure
+        beside = f"{measure.reference:.5g}", f"{100 * measure.error:+.3g} %", f"{100 * measure.tolerance:g} %"
         return (
             self.entry.model.name,
             ", ".join(self.entry.settings),
             str(self.resolution),
             measure.name,
             f"{measure.value:.5g}",
-            f"{measure.reference:.5g}",
-            f"{100 * measure.error:+.3g} %",
-            f"{100 * measure.tolerance:g} %",
+            *("" if np.isnan(measure.reference) else told for told in beside),
             "" if np.isnan(self.order) else f"{self.order:.1f}",
             (("pass" if measure.passed else "FAIL") if self.judged else "") + averages.remark(measure.value),
         )
@@ -270,8 +270,8 @@ def validate(
     Parameters
     ----------
     *names
-        Cases to validate, by name or as ``FILE.py:CLASS``; all of the suite if none is given. One that is in neither
-        suite is run at its own resolution until its own end.
+        Cases to validate, by name or as ``FILE.py:CLASS``; all of the suite if none is given. Those of a file are run
+        at their own resolution until their own end.
     full
         Take the full suite (hours) in place of the quick one (minutes).
     resolutions
@@ -316,19 +316,26 @@ def validate(
 def _chosen(names: Sequence[str], full: bool, suite: Sequence[Entry] | None) -> Sequence[Entry]:
     """Return the entries of the suite for the cases with these names, all of them if there are no names.
 
-    A case that is in neither suite has an entry of its own.
+    A case of a user's has an entry of its own.
     """
     suite = suite or (FULL if full else QUICK)
-    chosen = [entry for entry in suite if not names or entry.case in names]
-    for name in names:
+    if not names:
+        return suite
+    chosen: dict[str, list[Entry]] = {}
+    for name in dict.fromkeys(names):
         model = cases.find(name)
-        if model.name in [entry.case for entry in chosen]:
-            continue
-        if not full and name in [entry.case for entry in FULL]:
-            raise ConfigError(f"{name}: only in the full suite, which takes longer; use --full (full=True)")
-        case = model()
-        chosen.append(Entry(name, (case.resolution,), until=case.default_until))
-    return chosen
+        if model.name in chosen:
+            raise ConfigError(f"{name}: there is a case '{model.name}' before it; give one of the classes another name")
+        entries = [entry for entry in suite if entry.case == name]
+        if not entries and model.__module__.split(".")[0] == "alsph":
+            longer = not full and name in [entry.case for entry in FULL]
+            told = "only in the full suite, which takes longer; use --full (full=True)"
+            raise ConfigError(f"{name}: {told if longer else f'in no suite, it has no reference; alsph run {name}'}")
+        if not entries:
+            case = model()
+            entries = [Entry(name, (case.resolution,), until=case.default_until)]
+        chosen[model.name] = entries
+    return [entry for entries in chosen.values() for entry in entries]
 
 
 class _Heading:
