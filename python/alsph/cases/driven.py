@@ -39,7 +39,7 @@ class Driven(Dimensional):
 
     inlet_velocity: str | None = Field(
         default=None,
-        description="velocity at the inlets by place and time, as '1 + 0.2*sin(2*pi*t/5), 0'; none: uniform, U [U]",
+        description="velocity at the inlets by place and time, as '1 + 0.2*sin(2*pi*t/5), 0'; none: the case's own [U]",
     )
     driving_force: str | None = Field(
         default=None, description="a further body force per unit mass by place and time, as '0.1*sin(t), 0' [U²/D]"
