@@ -47,7 +47,7 @@ def test_the_start_of_every_case_is_drawn_with_all_its_particles_and_sides(name)
 )
 def test_the_thinnest_part_is_drawn_where_it_is(shape, tip, end):
     spacing = 1 / 20
-    found = remarks.thinnest_tip(shape, spacing)
+    found = remarks.thinnest_tip(shape, remarks.thinnest(shape), spacing)
     assert np.abs(found) == pytest.approx(tip, abs=spacing)
     case = Body(shape=shape, resolution=20, length=7, height=5, upstream=2)
     figure = case.draw()

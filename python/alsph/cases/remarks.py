@@ -229,9 +229,9 @@ def thinnest(shape: Polygon | MultiPolygon) -> float:
     return thin
 
 
-def thinnest_tip(shape: Polygon | MultiPolygon, spacing: float) -> FloatArray:
-    """Return where (2,) the thinnest part of a shape ends, one thinner than 2 Δx if it tapers to an edge."""
-    thick = max(1.05 * thinnest(shape), THINNEST * spacing)
+def thinnest_tip(shape: Polygon | MultiPolygon, thickness: float, spacing: float) -> FloatArray:
+    """Return where (2,) the thinnest part of a shape, of that thickness, ends; what tapers is cut off below 2 Δx."""
+    thick = max(1.05 * thickness, THINNEST * spacing)
     rest = shape.buffer(-0.5 * thick).buffer(0.5 * thick)
     return tip(shape, shape.centroid if rest.is_empty else rest, 0.25 * spacing)
 

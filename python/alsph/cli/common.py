@@ -9,6 +9,9 @@ import typer
 import alsph
 from alsph.text import shown
 
+KINDS = ("png", "pdf", "svg")
+"""Formats of figures."""
+
 WORDS = {int: "a whole number", float: "a number"}
 
 

@@ -12,16 +12,13 @@ import typer
 import alsph
 from alsph import cases
 from alsph.cli.app import COMMANDS
-from alsph.cli.common import Jobs, Retry, Scheduler, StudyOutput, Walltime
+from alsph.cli.common import KINDS, Jobs, Retry, Scheduler, StudyOutput, Walltime
 from alsph.cli.help import App
 from alsph.cli.options import Given, group_of_cases
 from alsph.cli.terminal import say, say_run, say_table
 from alsph.errors import ConfigError
 from alsph.running.control import Control, seconds_of
 from alsph.text import shown
-
-KINDS = ("png", "pdf", "svg")
-"""Formats of pictures."""
 
 DPI = 150
 """Pixels an inch of the picture of a start."""

@@ -13,16 +13,13 @@ from typing import Annotated, Any
 import typer
 
 import alsph
-from alsph.cli.common import Plane, Retry, RunPath, Threads, Walltime, number_of, one_of
+from alsph.cli.common import KINDS, Plane, Retry, RunPath, Threads, Walltime, number_of, one_of
 from alsph.cli.help import App
 from alsph.cli.terminal import complain, exit_codes, say, say_run
 from alsph.errors import ConfigError, RunFolderError
 from alsph.parameters import choose
 from alsph.running.control import seconds_of
 from alsph.tables import markdown
-
-KINDS = ("png", "pdf", "svg")
-"""Formats of figures."""
 
 FIELDS = ("vorticity", "pressure", "velocity", "velocity_divergence", "q_criterion", "lambda_2")
 DERIVED = FIELDS[4:]

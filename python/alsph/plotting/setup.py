@@ -211,13 +211,14 @@ def _given(case: Bodies) -> list[FloatArray]:
 def _thinnest(case: Bodies) -> tuple[FloatArray, str] | None:
     """Return where (2,) what is carried of the thinnest part ends, and what it is called; None if it is thick."""
     spacing = case.particle_spacing
-    thickness = remarks.thinnest(case.outline) / spacing
-    if thickness > 0.99 * remarks.THICK:
+    thickness = remarks.thinnest(case.outline)
+    if thickness > 0.99 * remarks.THICK * spacing:
         return None
-    tip = shapely.Point(remarks.thinnest_tip(case.outline, spacing))
+    tip = shapely.Point(remarks.thinnest_tip(case.outline, thickness, spacing))
     left = shapely.union_all(case.carried)
     there = tip.coords[0] if left.is_empty else shapely.shortest_line(left, tip).coords[0]
-    return np.array(there) + case.centre, f"thinnest part: {f'{thickness:.3g} Δx' if thickness > 0.01 else 'an edge'}"
+    name = f"{thickness / spacing:.3g} Δx" if thickness > 0.01 * spacing else "an edge"
+    return np.array(there) + case.centre, f"thinnest part: {name}"
 
 
 def _draw_all(found: Setup, title: str) -> Figure:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -58,8 +59,43 @@ def table(history: dict[str, FloatArray]) -> pandas.DataFrame:
     return frame.set_index("time")
 
 
+class InUnits:
+    """What has times, axes and fields in D, U and ρ, and can be put into SI."""
+
+    time: Any
+    axes: dict[str, FloatArray]
+    si: bool
+
+    def in_si(self, units: Units) -> Self:
+        """Return it in SI: lengths in m, velocities in m/s, pressures in Pa, times in s.
+
+        Parameters
+        ----------
+        units : Units
+            What D, U and ρ are, as ``run.units``.
+
+        Raises
+        ------
+        ConfigError
+            If it is so already, or there are no units.
+        """
+        if self.si:
+            raise ConfigError("in_si: it is in SI already")
+        if not isinstance(units, Units):
+            raise ConfigError(f"in_si: units = {shown(units)}: must be alsph.Units; a run that was given none has none")
+        axes = {name: line * _factor("length", units) for name, line in self.axes.items()}
+        own: Any = self  # a dataclass
+        time = self.time * _factor("time", units)
+        found: Self = replace(own, time=time, axes=axes, si=True, **self._scaled(units))
+        return found
+
+    @abstractmethod
+    def _scaled(self, units: Units) -> dict[str, Any]:
+        """Return all else that has a unit, in SI."""
+
+
 @dataclass(frozen=True, eq=False)
-class Grid:
+class Grid(InUnits):
     """The fields of a snapshot in the middles of the cells of a regular grid; see :meth:`alsph.Run.to_grid`.
 
     Attributes
@@ -84,27 +120,8 @@ class Grid:
     symbols: Symbols = GENERAL
     si: bool = False
 
-    def in_si(self, units: Units) -> Grid:
-        """Return the grid in SI: lengths in m, velocities in m/s, pressures in Pa, the time in s.
-
-        Parameters
-        ----------
-        units : Units
-            What D, U and ρ are, as ``run.units``.
-
-        Raises
-        ------
-        ConfigError
-            If it is so already, or there are no units.
-        """
-        _check_units(self.si, units)
-        return replace(
-            self,
-            time=self.time * _factor("time", units),
-            axes={name: line * _factor("length", units) for name, line in self.axes.items()},
-            fields={name: values * _factor(name, units) for name, values in self.fields.items()},
-            si=True,
-        )
+    def _scaled(self, units: Units) -> dict[str, Any]:
+        return {"fields": {name: values * _factor(name, units) for name, values in self.fields.items()}}
 
     def components(self) -> dict[str, FloatArray]:
         """Return the fields with each component of a vector by itself: ``velocity_x``, ``velocity_y``, ..."""
@@ -154,7 +171,7 @@ class Grid:
 
 
 @dataclass(frozen=True, eq=False)
-class PlaneRecord:
+class PlaneRecord(InUnits):
     """Velocity and pressure that a run recorded on a plane, at points of a grid; NaN in bodies; see `planes`.
 
     Attributes
@@ -183,30 +200,13 @@ class PlaneRecord:
     symbols: Symbols = GENERAL
     si: bool = False
 
-    def in_si(self, units: Units) -> PlaneRecord:
-        """Return the record in SI: lengths in m, velocities in m/s, pressures in Pa, times in s.
-
-        Parameters
-        ----------
-        units : Units
-            What D, U and ρ are, as ``run.units``.
-
-        Raises
-        ------
-        ConfigError
-            If it is so already, or there are no units.
-        """
-        _check_units(self.si, units)
+    def _scaled(self, units: Units) -> dict[str, Any]:
         length = _factor("length", units)
-        return replace(
-            self,
-            time=self.time * _factor("time", units),
-            axes={name: line * length for name, line in self.axes.items()},
-            place={name: at * length for name, at in self.place.items()},
-            velocity=self.velocity * _factor("velocity", units),
-            pressure=self.pressure * _factor("pressure", units),
-            si=True,
-        )
+        return {
+            "place": {name: at * length for name, at in self.place.items()},
+            "velocity": self.velocity * _factor("velocity", units),
+            "pressure": self.pressure * _factor("pressure", units),
+        }
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the record as a data set of xarray.
@@ -300,14 +300,6 @@ def _check(path: Path) -> None:
 def _write_columns(columns: dict[str, FloatArray], path: Path) -> None:
     rows = np.stack([column.ravel() for column in columns.values()], axis=1)
     np.savetxt(path, rows, "%.9g", ",", header=",".join(columns), comments="")
-
-
-def _check_units(si: bool, units: Units | None) -> None:
-    """Refuse what is in SI already, or has no units to be put into it."""
-    if si:
-        raise ConfigError("in_si: it is in SI already")
-    if not isinstance(units, Units):
-        raise ConfigError(f"in_si: units = {shown(units)}: must be alsph.Units; a run that was given none has none")
 
 
 def _factor(field: str, units: Units) -> float:

@@ -339,10 +339,22 @@ class Run(Loads):
         if path is None:
             check_folder(self.path / "figures")
         target: Path = _plotting().Film(path if path is not None else self.path / "figures" / f"{name}.gif")
-        chosen = {"start": start, "end": end, "every": every, "fps": fps}
-        seen = {"limit": limit, "view": view, "plane": plane_of, "progress": progress}
-        told = {"title": self._title, "said": self._said(), "symbols": self.symbols}
-        _plotting().animate(self, name, target, **chosen, **seen, **told)
+        _plotting().animate(
+            self,
+            name,
+            target,
+            start=start,
+            end=end,
+            every=every,
+            fps=fps,
+            limit=limit,
+            view=view,
+            title=self._title,
+            said=self._said(),
+            symbols=self.symbols,
+            plane=plane_of,
+            progress=progress,
+        )
         return target
 
     def plot_pressure_coefficient(
