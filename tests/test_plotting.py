@@ -12,6 +12,7 @@ from alsph.errors import ConfigError
 from alsph.folder.run_folder import RunFolder
 from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Kind, Snapshot
+from alsph.plotting.curves import Curve
 from alsph.plotting.pictures import _limit
 from alsph.plotting.style import line
 from alsph.study.results import names
@@ -363,3 +364,12 @@ def test_outlines_turn_with_the_body(tmp_path):
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     inner = np.array([[0.0, -1e-3], [0.0, 1e-3]]) @ turn.T  # on both sides of the floor
     assert np.sign(run.snapshot().solid(inner)).tolist() == [-1, 1]
+
+
+def test_a_curve_has_one_colour_in_all_panels():
+    first = [Curve("alsph", [0.3, 0.6], [1, 2]), Curve("isph", [0.4], [2])]
+    figure = plotting.panels({"a": first, "b": first[1:]}, "cost", ("x", "y"))
+    looks = [{line.get_label(): (line.get_color(), line.get_marker()) for line in axes.lines} for axes in figure.axes]
+    assert looks[0]["isph"] == looks[1]["isph"] != looks[0]["alsph"]
+    figure.canvas.draw()
+    assert "0.4" in [label.get_text() for label in figure.axes[0].xaxis.get_ticklabels(minor=True)]

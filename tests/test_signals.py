@@ -29,6 +29,13 @@ def test_batch_means_are_those_of_the_straight_lines_between_samples():
     assert batch_means(time, values[:, 0], edges) == pytest.approx(expected[:, 0])
 
 
+def test_the_mean_of_what_is_left_of_a_large_signal_keeps_its_digits():
+    time = np.linspace(0, 4, 401)
+    signal = np.where(time < 1, 10.0, 1e-14)
+    assert batch_means(time, signal, np.array([2.0, 3.0, 4.0])) == pytest.approx([1e-14, 1e-14], rel=1e-12, abs=0)
+    assert batch_means(time, signal**2, np.array([2.0, 4.0])) == pytest.approx([1e-28], rel=1e-12, abs=0)
+
+
 def test_smoothing_averages_over_the_width_wherever_it_fits():
     time = np.arange(0, 10.25, 0.25)
     inside, values = smoothed(time, time**2, 1.0)

@@ -210,7 +210,7 @@ class Curve:
 
 
 def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str] = ()) -> Figure:
-    """Curves over a common abscissa, one panel for each ordinate, three in a row.
+    """Curves over a common abscissa, one panel for each ordinate, three in a row; a label has one colour in all.
 
     Parameters
     ----------
@@ -225,9 +225,11 @@ def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str
     rows = -(-len(panels) // columns)
     figure = blank(6.5 * columns, 4.5 * rows)
     grid = figure.subplots(rows, columns, squeeze=False).flat
+    labels = list(dict.fromkeys(curve.label for curves in panels.values() for curve in curves))
     for axes, (name, curves) in zip(grid, panels.items(), strict=False):
         axes.set(**{f"{axis}scale": "log" for axis in logarithmic})
-        for index, curve in enumerate(curves):
+        for curve in curves:
+            index = labels.index(curve.label)
             style = curve.style or f"{MARKERS[index % len(MARKERS)]}-"
             colour = curve.colour or PALETTE[index % len(PALETTE)]
             axes.plot(curve.x, curve.y, style, color=colour, ms=5, lw=1, label=curve.label)
@@ -238,6 +240,9 @@ def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str
             if len(ticks) <= max(len(curve.x) for curve in curves):  # else, of each its own, they stand on each other
                 axes.set_xticks(ticks, [f"{x:.3g}" for x in ticks])
                 axes.xaxis.minorticks_off()
+            elif ticks[-1] < 10 * ticks[0]:  # in less than a decade there may be one power of ten
+                axes.xaxis.set_major_formatter("{x:g}")
+                axes.xaxis.set_minor_formatter("{x:g}")
         axes.set(xlabel=label, ylabel=name)
         axes.grid(alpha=0.3)
         axes.legend(fontsize="small")
