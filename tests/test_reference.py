@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from alsph import Run, reference
 from alsph.analysis.measures import Measure
-from alsph.cases import Cylinder, TaylorGreen
+from alsph.cases import Cylinder, Sphere, TaylorGreen
 from synthetic import DRAG, LIFT, STROUHAL, write_run
 
 FORCES = list(reference.COLUMNS)
@@ -126,3 +126,22 @@ def test_a_measure_passes_within_its_tolerance():
     assert Measure("lift", -1.1, -1.0, 0.2).error == pytest.approx(-0.1)
     assert Measure("error", 0.03, 0.0, 0.05).error == 0.03
     assert not Measure("drag", math.nan, 1.0, 0.02).passed and not Measure("drag", 1.0).passed
+
+
+def test_a_sphere_is_compared_in_its_own_channel():
+    case = Sphere(quarter=True)
+    known = case._reference().results
+    parts = known["mean drag coefficient, pressure part"] + known["mean drag coefficient, viscous part"]
+    assert known["mean drag coefficient"] == pytest.approx(parts, abs=2e-5) == pytest.approx(1.133, abs=1e-3)
+    assert case.replace(height=10, width=10)._reference().results["mean drag coefficient"] < parts
+    assert case.replace(length=10)._reference() is case.replace(reynolds=99)._reference() is None
+    assert case.replace(quarter=False, body_offset=0.5)._reference() is None
+
+
+def test_a_row_is_found_by_what_is_given():
+    given = {"flow": "developed", "Re": 100, "speed": 1.0}
+    known = reference.matching("rotating_cylinder.csv", given)
+    assert known["speed"] == 1 and known["CL_rms"] > 0 and "flow" not in known
+    assert math.isnan(reference.matching("rotating_cylinder.csv", given | {"flow": "start"})["CL_rms"])
+    assert reference.matching("rotating_cylinder.csv", given | {"flow": "neither"}) == {}
+    assert reference.matching("rotating_cylinder.csv", given | {"speed": 1.01}) == {}

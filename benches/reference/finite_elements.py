@@ -6,6 +6,7 @@ extrapolated convective term. At the outlet the traction vanishes (natural condi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import netgen.occ as occ
@@ -58,6 +59,8 @@ class Flow:
         The velocity (2,) at the inlet [U].
     surface
         The velocity (2,) of the body's surface, along itself [U].
+    round
+        Whether the flow is the same all around the axis y = 0, where the mesh ends, called side.
     """
 
     def __init__(
@@ -67,8 +70,11 @@ class Flow:
         order: int = 4,
         inflow: tuple[ng.CoefficientFunction | float, ...] = (1, 0),
         surface: ng.CoefficientFunction | tuple[float, float] = (0, 0),
+        *,
+        round: bool = False,
     ) -> None:
         self.mesh, self.body = mesh, mesh.Boundaries("body")
+        self._round, self._around = round, 2 * math.pi * ng.y if round else ng.CoefficientFunction(1)
         velocity = ng.VectorH1(mesh, order=order, dirichletx="inlet|body", dirichlety="inlet|side|body")
         self.space = velocity * ng.H1(mesh, order=order - 1)
         self.flow, self._inflow = ng.GridFunction(self.space), ng.GridFunction(self.space)
@@ -77,11 +83,13 @@ class Flow:
         self._inflow.components[0].Set(given, definedon=mesh.Boundaries("inlet|body"))
         self.flow.vec.data = self._inflow.vec
         (u, p), (v, q) = self.space.TnT()
-        viscous = ng.InnerProduct(ng.Grad(u) + ng.Grad(u).trans, ng.Grad(v)) / reynolds
-        self._stokes = viscous - ng.div(u) * q - ng.div(v) * p
-        self._inertia, self._transport = u * v, ng.InnerProduct(ng.Grad(u) * u, v)
+        strain = ng.InnerProduct(ng.Grad(u) + ng.Grad(u).trans, ng.Grad(v))
+        if round:
+            strain += 2 * u[1] * v[1] / ng.y**2
+        self._stokes = self._around * (strain / reynolds - self._divergence(u) * q - self._divergence(v) * p)
+        self._inertia, self._transport = self._around * u * v, self._around * ng.InnerProduct(ng.Grad(u) * u, v)
         self._convection = ng.LinearForm(self.space)
-        self._convection += ng.InnerProduct(ng.Grad(self.velocity) * self.velocity, v) * ng.dx
+        self._convection += self._around * ng.InnerProduct(ng.Grad(self.velocity) * self.velocity, v) * ng.dx
         self._residual = self.flow.vec.CreateVector()
         self._shifts = [self.shift(along) for along in ((1, 0), (0, 1))]
 
@@ -129,7 +137,7 @@ class Flow:
         return -2 * ng.InnerProduct(self._residual, shift.vec)
 
     def loads(self) -> list[float]:
-        """Return drag, its pressure and its viscous part, and those of the lift, with ½ρU²D.
+        """Return drag, its pressure and its viscous part, and those of the lift, with ½ρU²D (½ρU²D² if `round`).
 
         The whole is :meth:`push`, which is more exact at corners than an integral over the surface, as which the
         pressure's part is found; the viscous one is the rest.
@@ -137,10 +145,14 @@ class Flow:
         loads = []
         for shift in self._shifts:
             moved = shift.components[0]
-            density = ng.Grad(self.pressure) * moved + self.pressure * ng.div(moved)
+            density = self._around * (ng.Grad(self.pressure) * moved + self.pressure * self._divergence(moved))
             whole, pressure = self.push(shift), 2 * ng.Integrate(density, self.mesh)
             loads += [whole, pressure, whole - pressure]
         return loads
+
+    def _divergence(self, velocity: ng.CoefficientFunction) -> ng.CoefficientFunction:
+        spread = velocity[1] / ng.y if self._round else 0
+        return ng.div(velocity) + spread
 
     def _implicit(self, rate: float) -> tuple[ng.BaseMatrix, ng.BaseMatrix, ng.BaseVector]:
         """Return matrix and inverse of the implicit terms, and what they make of the velocity that is given."""

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+Arrays = dict[str, NDArray[Any]]
+"""Arrays by name, such as those of particles."""
+
 AXES = ("x", "y", "z")
 
 

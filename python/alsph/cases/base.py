@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases import remarks
 from alsph.cases.discretised import Discretised
 from alsph.cases.driven import RULES
@@ -69,6 +68,10 @@ class Case(Discretised):
     title: ClassVar[str]
     settles: ClassVar[bool] = True
     """Whether the flow may become steady or periodic; if not, averages are of the whole run, without ±."""
+    steady: ClassVar[bool] = False
+    """Whether measures are of the steady flow late in a run; they are said to develop where they change until then."""
+    from_start: ClassVar[bool] = False
+    """Whether references are of the flow from its own start on, not of one that goes on with another run's."""
     picture_axis: ClassVar[str] = "z"
     """Axis that the plane of pictures in 3-D is normal to where none is given."""
     made_for: ClassVar[tuple[str, ...]] = ()
@@ -136,7 +139,7 @@ class Case(Discretised):
         return 1.0
 
     @abstractmethod
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return the particles at the start."""
 
     @property
@@ -228,8 +231,18 @@ class Case(Discretised):
             *remarks.scheme(self.scheme, self.wall_pressure),
             *remarks.derived(type(self)),
             *remarks.prescribed(self._driven_by),
+            *([f"no reference: {self.no_reference}"] if self.no_reference else []),
             *remarks.penalty(self.expected_penalty_constant()),
         ]
+
+    @property
+    def no_reference(self) -> str:
+        """Why references do not hold for these parameters, in words; empty where they do."""
+        return ""
+
+    def compared(self, measures: list[Measure]) -> list[Measure]:
+        """Return measures as they are, or without their reference where it does not hold (:attr:`no_reference`)."""
+        return [alone for measure in measures if (alone := measure.alone())] if self.no_reference else measures
 
     def measures(self, run: Record) -> list[Measure]:
         """Return what a run of this case is judged by."""
@@ -274,7 +287,7 @@ class Case(Discretised):
 
         return plotting.start(self)
 
-    def _warn_of_unused_velocities(self, state: dict[str, NDArray[Any]]) -> None:
+    def _warn_of_unused_velocities(self, state: Arrays) -> None:
         """Warn if solid particles have velocities that are not those of their body, which are the ones that hold."""
         for index, body in enumerate(self.settings()["bodies"]):
             own = state["velocity"][(state["kind"] == Kind.SOLID) & (state["body"] == index)]

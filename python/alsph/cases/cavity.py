@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from pydantic import Field
 
 from alsph import reference
 from alsph.analysis import sampling
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases import remarks
 from alsph.cases.base import Case
 from alsph.geometry.domain import Domain, SolidBody
@@ -49,6 +48,7 @@ class Cavity(Case):
 
     name: ClassVar[str] = "cavity"
     title: ClassVar[str] = "lid-driven cavity"
+    steady: ClassVar[bool] = True
 
     resolution: int = Field(default=50, ge=8, description="particles per side of the cavity, D/Δx [-]")
     lid: Literal["slides", "in_place"] = Field(
@@ -90,7 +90,7 @@ class Cavity(Case):
         beyond = (self.support_layers + 1) * self.particle_spacing
         return [-beyond, 1 + beyond]
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a lattice of fluid at rest and the solid particles around it."""
         solid = walls(BOX, self.particle_spacing, self.support_layers)
         below = solid.position[:, 1] < 1

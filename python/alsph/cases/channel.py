@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from functools import cached_property
-from typing import Any, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
+from alsph import reference
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases import remarks
 from alsph.cases.base import Case
 from alsph.cases.duct import parabola
@@ -25,6 +25,9 @@ from alsph.reference import Reference
 
 SIDES = "sides"
 """Name of the sides that do not let slip, among the bodies."""
+
+CHANNEL = {"reynolds": "Re", "length": "L_over_D", "height": "H_over_D", "upstream": "LU_over_D"}
+"""Parameters that the channel of a reference is told by, and their columns."""
 
 PARABOLA = 1.5
 """Largest velocity of the parabola over its mean."""
@@ -185,7 +188,7 @@ class Channel(Case):
         """Names of the bodies whose surface may slide: those in place, without the sides."""
         return [name for name in super().sliding_bodies if name != SIDES or not self.is_confined]
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a uniform lattice around the body's solid particles, impulsively started."""
         spacing = self.particle_spacing
         rows = [symmetric_centres(self.whole_cells(name, getattr(self, name)), spacing) for name in self.across]
@@ -244,6 +247,11 @@ class Channel(Case):
     def _reference(self) -> Reference | None:
         """Return the independent solution of this flow, None where there is none."""
         return None
+
+    def _known(self, table: str, **given: float | str) -> dict[str, float]:
+        """Return the row of a table of references that is of this channel and what is `given`; empty if none is."""
+        own = {column: getattr(self, name) for name, column in CHANNEL.items()}
+        return reference.matching(table, own | given)
 
     def _initial_velocity(self, position: FloatArray) -> FloatArray:
         """Return the stream and a Gaussian vortex (divergence-free) about the body, fastest 0.6 D from its centre."""

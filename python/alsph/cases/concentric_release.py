@@ -6,12 +6,11 @@ import math
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.base import Case
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.particles import Kind, join, particles
@@ -89,7 +88,7 @@ class ConcentricRelease(Case):
         hollow = max(0.0, RADIUS * self.resolution - self.support_layers)
         return round(np.pi * ((self.vessel / 2 * self.resolution + self.support_layers) ** 2 - hollow**2))
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return evenly spaced fluid at rest between rings of solid particles."""
         spacing, layers = self.particle_spacing, self.support_layers
         inner = cylinder_rings(RADIUS, spacing, layers)

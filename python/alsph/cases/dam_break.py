@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any, ClassVar, Literal, NamedTuple, Self
+from typing import ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from alsph import reference
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.free_surface import FreeSurface, Sensors
 from alsph.cases.sensors import WallSensors
 from alsph.cases.series import Series
@@ -132,6 +131,7 @@ class DamBreak(FreeSurface):
 
     name: ClassVar[str] = "dam_break"
     title: ClassVar[str] = "dam break in a tank"
+    inviscid_from: ClassVar[float] = 1000.0
     splashes: ClassVar[bool] = True
     later_names: ClassVar[tuple[str, ...]] = (
         *FreeSurface.later_names,
@@ -213,7 +213,7 @@ class DamBreak(FreeSurface):
         """That of the column [H^d]."""
         return self.length * (self.width if self.dimensions == 3 else 1.0)
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return the column at rest, with the pressure of its first instant."""
         cells = [self.whole_cells("length", self.length), self.resolution]
         if self.dimensions == 3:
@@ -257,7 +257,7 @@ class DamBreak(FreeSurface):
     def measures(self, run: Record) -> list[Measure]:
         """Return the front beside an inviscid computation or experiments, impulses, and what energy was made."""
         rows = [*self._fronts(run), *(self._impulses(run) if self._is_compared else [])]
-        return rows + self.energy_measures(run)
+        return self.compared(rows) + self.energy_measures(run)
 
     @property
     def _is_compared(self) -> bool:
@@ -293,7 +293,7 @@ class DamBreak(FreeSurface):
         nothing = np.empty(0), np.empty(0)
         clock = "$t\\sqrt{g/H}$"
         time, front = Front.read(run)
-        known = tuple(reference.table("dam_break_front.csv")) if self._is_compared else nothing
+        known = tuple(reference.table("dam_break_front.csv")) if self._is_compared and not self.no_reference else nothing
         axes = clock, "front $x/H$"
         drawn = [Profile("front", axes, (time, front[0]), known, COMPUTATION)]
         for column in COLUMNS.get(self.length, ()):

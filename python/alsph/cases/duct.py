@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field
 
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.base import Case
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cells, inside
@@ -63,7 +62,7 @@ class Duct(Case):
         solid = channel.buffer(depth).intersection(shapely.box(left, bottom, right, top)) - channel
         return round(float(self.channel(self._buffer).area + solid.area) / self.particle_spacing**2)
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a lattice in the channel and its buffers, each with its developed flow, between solid walls."""
         spacing, buffer = self.particle_spacing, self._buffer
         channel = self.channel(self._end)

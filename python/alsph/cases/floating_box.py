@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.free_surface import FreeSurface
 from alsph.cases.heave import SOURCE, linear_heave
 from alsph.errors import ConfigError
@@ -133,7 +132,7 @@ class FloatingBox(FreeSurface):
         box = self.size[0] * self.size[1] - hollow[0] * hollow[1]
         return super().particle_estimate() + round(box * self.resolution**2)
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return water at rest around the box."""
         spacing, box = self.particle_spacing, self._box
         columns = cell_centres(self.whole_cells("tank_length", self.tank_length), spacing) - self.tank_length / 2

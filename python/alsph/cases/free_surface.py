@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
 from alsph.analysis.energy import PARTS, energy, largest_rise, taken
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
 from alsph.analysis.sampling import pressure_on_walls
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.base import Case
 from alsph.cases.series import Series
 from alsph.engine.prescribed import asked
@@ -171,6 +171,8 @@ class FreeSurface(Case):
     """Whether the body force (0, −1), in 3-D (0, 0, −1), acts."""
     tension: ClassVar[bool] = False
     """Whether the pressure may fall below that of the air, as in a fluid that turns."""
+    inviscid_from: ClassVar[float] = 0.0
+    """Reynolds number from which on references hold that are of a fluid without viscosity."""
     splashes: ClassVar[bool] = False
     """Whether impacts press particles together, which `packing_relaxation` takes apart."""
 
@@ -289,7 +291,7 @@ class FreeSurface(Case):
         """Return lengths to the nearest multiple of `count` particle spacings [D]."""
         return np.asarray(count * np.rint(np.asarray(lengths) / count * self.resolution) / self.resolution)
 
-    def fluid(self, position: FloatArray, velocity: FloatArray, pressure: FloatArray) -> dict[str, NDArray[Any]]:
+    def fluid(self, position: FloatArray, velocity: FloatArray, pressure: FloatArray) -> Arrays:
         """Return fluid particles, whose pressure is not below that of the air unless tension is allowed."""
         pressure = pressure if self.tension else np.maximum(pressure, 0.0)
         return particles(Kind.FLUID, position, velocity, pressure=pressure)
@@ -302,6 +304,13 @@ class FreeSurface(Case):
             velocity = (GRAVITY * self.units.length) ** 0.5
             found.append(f"{told}; on earth units_velocity is √(gH) = {velocity:.4g}")
         return found
+
+    @property
+    def no_reference(self) -> str:
+        """Say that the fluid is too viscous for references that are of one without viscosity."""
+        if self.reynolds >= self.inviscid_from:
+            return ""
+        return f"it is of a fluid without viscosity, and holds from Re = {self.inviscid_from:g} on"
 
     def measures(self, run: Record) -> list[Measure]:
         """Return what energy was made."""

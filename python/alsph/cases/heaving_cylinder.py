@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.free_surface import FreeSurface
 from alsph.cases.heave import SOURCE, linear_heave
 from alsph.errors import ConfigError
@@ -111,7 +110,7 @@ class HeavingCylinder(FreeSurface):
         """Return about how many particles there are, with those of the cylinder."""
         return super().particle_estimate() + len(self._solid.position)
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return water at rest around the cylinder."""
         columns = self.whole_cells("tank_length", self.tank_length)
         rows = self.whole_cells("depth", self.depth)

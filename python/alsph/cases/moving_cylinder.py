@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field
 
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.base import Case
 from alsph.geometry.domain import Boundary, Domain, SolidBody
 from alsph.geometry.lattice import lattice, symmetric_centres
@@ -54,7 +54,7 @@ class MovingCylinder(Case):
     def motion(self, position: FloatArray, time: float) -> ArrayLike:
         """Return how far the cylinder has come [D]."""
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a lattice at rest around the cylinder."""
         spacing = self.particle_spacing
         columns = [self.whole_cells(name, getattr(self, name)) for name in ("length", "height")]

@@ -31,6 +31,7 @@ class Nozzle(Duct):
 
     name: ClassVar[str] = "nozzle"
     title: ClassVar[str] = "flow through a plane nozzle"
+    steady: ClassVar[bool] = True
     velocity_max: ClassVar[float] = 1.5
 
     reynolds: float = Field(default=50.0, gt=0, description="Reynolds number UD/ν, of the outlet channel [-]")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.dam_break import column_pressure
 from alsph.cases.free_surface import FreeSurface
 from alsph.geometry.domain import Domain, SolidBody
@@ -86,7 +86,7 @@ class Obstacle(FreeSurface):
         """Return about how many particles there are, with those of the box."""
         return super().particle_estimate() + len(self._solid.position)
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return the water at rest, the column with the pressure of its first instant, and the box."""
         length, width, _ = self._cells(self.tank)
         position = lattice(*(cell_centres(count, self.particle_spacing) for count in (length, width, self.resolution)))

@@ -1,12 +1,11 @@
 """Start-up of flow through a pipe, with its exact transient: walls in space."""
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.parallel_flow import ParallelFlow
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, extruded, lattice, symmetric_centres
@@ -74,7 +73,7 @@ class Pipe(ParallelFlow):
         radius = RADIUS * self.resolution + self.support_layers
         return round(self.length * self.resolution * np.pi * radius**2)
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return sections of evenly spaced fluid and of rings of wall, one behind the other."""
         spacing = self.particle_spacing
         wall = cylinder_rings(RADIUS, spacing, self.support_layers, side=-1)

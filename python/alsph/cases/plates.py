@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.parallel_flow import ParallelFlow
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.lattice import cells
@@ -48,7 +47,7 @@ class Plates(ParallelFlow):
         middle = self.length / 2, 0.5
         return [SolidBody("lower", middle), SolidBody("upper", middle, (self.upper_velocity, 0))]
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a lattice of fluid between the solid particles of the plates."""
         region = shapely.box(0, 0, self.length, 1)
         solid = walls(region, self.particle_spacing, self.support_layers)

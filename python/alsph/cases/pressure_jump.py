@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
+from alsph.arrays import Arrays
 from alsph.cases.base import Case
 from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_centres, lattice
@@ -29,6 +29,7 @@ class PressureJump(Case):
 
     name: ClassVar[str] = "pressure_jump"
     title: ClassVar[str] = "pressure jump in a uniform stream"
+    from_start: ClassVar[bool] = True
 
     resolution: int = Field(default=40, ge=8, description="particles per side of the square, D/Δx [-]")
 
@@ -41,7 +42,7 @@ class PressureJump(Case):
         """Return the unit square."""
         return Domain((0, 0), (1, 1), [("slip", "slip"), ("periodic", "periodic")])
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a lattice in the stream, its left half under pressure."""
         position = lattice(*[cell_centres(self.resolution, self.particle_spacing)] * 2)
         return particles(Kind.FLUID, position, [0.0, 1.0], pressure=position[:, 0] < 0.5)

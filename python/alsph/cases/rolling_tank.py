@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field
 
 from alsph import reference
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.free_surface import FreeSurface
 from alsph.cases.sensors import WallSensors
 from alsph.engine.output import Output
@@ -102,7 +102,7 @@ class RollingTank(FreeSurface):
         walls = layers * (2 * height + length) * self.resolution + 2 * layers**2
         return super().particle_estimate() + round(walls)
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return water at rest in the tank."""
         (length, height), spacing = self.size, self.particle_spacing
         columns = cell_centres(round(length * self.resolution), spacing) - length / 2

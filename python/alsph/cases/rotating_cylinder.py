@@ -16,7 +16,6 @@ from alsph.arrays import FloatArray
 from alsph.cases.cylinder import Cylinder
 from alsph.reference import Reference
 
-GIVEN = ("Re", "speed", "L_over_D", "H_over_D", "LU_over_D")
 SOURCE = "finite elements in the same channel"
 EARLY = (2.0, 4.0)
 """Times [D/U] between which the loads are averaged while the wake behind the impulsive start still grows."""
@@ -71,7 +70,8 @@ class RotatingCylinder(Cylinder):
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the loads soon after the start, then forces and Strouhal number of the flow that has developed."""
-        history, known = run.history, {} if self.perturbation else self._known("start")
+        at_rest = not self.perturbation and not run.info.get("start", {}).get("initial_run")
+        history, known = run.history, self._loads("start") if at_rest else {}
         time = history["time"]
         within = (time > EARLY[0]) & (time <= EARLY[1])
         whole = len(time) > 0 and time[-1] >= EARLY[1] - self.particle_spacing
@@ -98,18 +98,14 @@ class RotatingCylinder(Cylinder):
         return [Profile("pressure coefficient", axes, (found.theta, found.mean), (np.empty(0), np.empty(0)), "")]
 
     def _reference(self) -> Reference | None:
-        known = self._known("developed")
+        known = self._loads("developed")
         names = reference.COLUMNS | {"mean lift coefficient": "CL_mean"}
         return Reference({name: known[column] for name, column in names.items()}, SOURCE) if known else None
 
-    def _known(self, flow: str) -> dict[str, float]:
+    def _loads(self, flow: str) -> dict[str, float]:
         """Return what is known of the flow soon after the start, or of the one that has developed; empty if nothing."""
         if self.body_offset:
             return {}
-        given = (self.reynolds, abs(self.surface_speed), self.length, self.height, self.upstream)
+        known = self._known("rotating_cylinder.csv", flow=flow, speed=abs(self.surface_speed))
         mirrored = math.copysign(1.0, self.surface_speed)
-        for row in reference.rows("rotating_cylinder.csv"):
-            if row.pop("flow") == flow and tuple(float(row[name]) for name in GIVEN) == given:
-                known = {name: float(value) for name, value in row.items()}
-                return known | {name: mirrored * known[name] for name in ("CL_mean", "torque")}
-        return {}
+        return known | {name: mirrored * known[name] for name in ("CL_mean", "torque") if known}

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.free_surface import FreeSurface
 from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_centres, lattice
@@ -32,6 +31,7 @@ class RotatingPatch(FreeSurface):
 
     name: ClassVar[str] = "rotating_patch"
     title: ClassVar[str] = "rotating square patch"
+    inviscid_from: ClassVar[float] = 1000.0
     symbols: ClassVar[Symbols] = Symbols("L", "ΩL", "Ω⁻¹", "Ω", "Ω²L", "ρΩ²L²", "Ωt")
     gravity: ClassVar[bool] = False
     tension: ClassVar[bool] = True
@@ -58,7 +58,7 @@ class RotatingPatch(FreeSurface):
         """That of the square [L²]."""
         return 1.0
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a lattice that turns, with the pressure of its first instant."""
         axis = cell_centres(self.resolution, self.particle_spacing) - 0.5
         position = lattice(axis, axis)
@@ -84,7 +84,7 @@ class RotatingPatch(FreeSurface):
             alone = float(run.history["isolated"][-1] / run.history["fluid"][-1])
             rows.append(Measure("share of isolated particles", alone, 0.0, 0.01, "a patch without voids"))
         source = "inviscid fluid"
-        return [
+        found = [
             Measure(
                 "angular momentum over its start",
                 turned / self._angular_momentum(start["position"], start["velocity"]),
@@ -93,8 +93,8 @@ class RotatingPatch(FreeSurface):
                 source,
             ),
             Measure("kinetic energy over its start", float(energy[-1] / energy[0]), 1.0, 0.05, source),
-            *rows,
         ]
+        return self.compared(found) + rows
 
     @staticmethod
     def _angular_momentum(position: FloatArray, velocity: FloatArray) -> float:

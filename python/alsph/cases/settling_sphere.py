@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from alsph import reference
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.base import Case
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain, SolidBody
@@ -117,7 +116,7 @@ class SettlingSphere(Case):
         """Return the volume of the quarter of the column without the sphere."""
         return self.width**2 / 4 * self.height - math.pi / 24
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a lattice at rest around the sphere."""
         spacing = self.particle_spacing
         across = symmetric_centres(2 * self.whole_cells("width / 2", self.width / 2), spacing)

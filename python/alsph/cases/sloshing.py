@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
 from alsph import reference
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.free_surface import FreeSurface, Levels
 from alsph.engine.output import Output
 from alsph.errors import ConfigError
@@ -162,7 +162,7 @@ class Sloshing(FreeSurface):
         """That of the water [H²]."""
         return self._whole_length
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a lattice at rest with the hydrostatic pressure."""
         spacing = self.particle_spacing
         position = lattice(cell_centres(self._columns, spacing), cell_centres(self.resolution, spacing))

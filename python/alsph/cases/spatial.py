@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from functools import cached_property
-from typing import Any, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases import remarks
 from alsph.cases.channel import Channel
 from alsph.errors import ConfigError
@@ -149,7 +148,7 @@ class Spatial(Channel):
         domain = super().domain()
         return Domain((0, 0, 0), domain.upper, domain.boundaries) if self.quarter else domain
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a lattice around the body's solid particles, impulsively started."""
         found = super().particles()
         kept = (found["position"][:, 1:] > 0).all(axis=1) if self.quarter else slice(None)

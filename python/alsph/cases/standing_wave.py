@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
+from alsph.arrays import Arrays
 from alsph.cases.free_surface import FreeSurface
 from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_centres, lattice
@@ -50,7 +50,7 @@ class StandingWave(FreeSurface):
         """That of the water [H²]."""
         return 1.0
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a lattice moved as the water is by the wave, without a change of volume, at rest."""
         x, y = lattice(*[cell_centres(self.resolution, self.particle_spacing)] * 2).T
         moved = [-np.cosh(WAVE * y) * np.sin(WAVE * x), np.sinh(WAVE * y) * np.cos(WAVE * x)]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
+from alsph.arrays import Arrays
 from alsph.cases.free_surface import FreeSurface
 from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_centres, lattice
@@ -47,7 +47,7 @@ class StillWater(FreeSurface):
         """That of the water [H²]."""
         return self.length
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a lattice at rest with the hydrostatic pressure."""
         columns = self.whole_cells("length", self.length)
         spacing = self.particle_spacing

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from alsph.analysis.averages import error_norms
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.base import Case
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.geometry.particles import Kind, join, particles
@@ -35,6 +34,7 @@ class TaylorCouette(Case):
 
     name: ClassVar[str] = "taylor_couette"
     title: ClassVar[str] = "start-up of flow between turning cylinders"
+    from_start: ClassVar[bool] = True
     later_names: ClassVar[tuple[str, ...]] = ("velocity at tU/D = ",)
 
     reynolds: float = Field(default=10.0, gt=0, description="Reynolds number UD/ν [-]")
@@ -66,7 +66,7 @@ class TaylorCouette(Case):
         hollow = max(0.0, self.inner_radius * self.resolution - self.support_layers)
         return round(np.pi * ((self.outer_radius * self.resolution + self.support_layers) ** 2 - hollow**2))
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return evenly spaced fluid at rest between rings of solid particles."""
         spacing, layers = self.particle_spacing, self.support_layers
         inner = cylinder_rings(self.inner_radius, spacing, layers)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from alsph import reference
 from alsph.analysis import averages
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.base import Case
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain
@@ -28,6 +27,7 @@ class TaylorGreen(Case):
 
     name: ClassVar[str] = "taylor_green"
     title: ClassVar[str] = "decaying Taylor-Green vortices in a periodic box"
+    from_start: ClassVar[bool] = True
     of_the_start: ClassVar[tuple[str, ...]] = ("perturbation", "seed")
     later_names: ClassVar[tuple[str, ...]] = ("largest error of the kinetic energy over its start",)
 
@@ -58,7 +58,7 @@ class TaylorGreen(Case):
         d = self.dimensions
         return Domain([0] * d, [1] * d, [("periodic", "periodic")] * d)
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a lattice, displaced at random if asked for, with the initial velocity and pressure."""
         position = lattice(*[cell_centres(self.resolution, self.particle_spacing)] * self.dimensions)
         shift = self.perturbation * self.particle_spacing

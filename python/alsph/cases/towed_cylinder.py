@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field
 
 from alsph.analysis.measures import Measure
 from alsph.analysis.record import Record
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.cases.moving_cylinder import MovingCylinder
 from alsph.geometry.domain import Boundary
 from alsph.geometry.particles import Kind
@@ -45,7 +45,7 @@ class TowedCylinder(MovingCylinder):
         """Return how far the cylinder has come [D]."""
         return [-time if self.frame == "fluid" else 0.0, 0.0]
 
-    def particles(self) -> dict[str, NDArray[Any]]:
+    def particles(self) -> Arrays:
         """Return a lattice around the cylinder, at rest or with the speed of the stream."""
         state = super().particles()
         state["velocity"][state["kind"] == Kind.FLUID, 0] = 0.0 if self.frame == "fluid" else 1.0

@@ -12,10 +12,10 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import alsph._alsph as _alsph
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.engine.columns import left_out
 from alsph.engine.core import TYPES, exact, translated
 from alsph.engine.motion import answering_poses, is_rigid
@@ -89,7 +89,7 @@ class Simulation:
         self.rules: dict[str, Rule] = {}
         self.prescribed: dict[str, Prescription] = {}
         self.backflow = ""
-        self._history: list[dict[str, NDArray[Any]]] = []
+        self._history: list[Arrays] = []
         self._start(problem.state, threads)
 
     def _start(self, state: dict[str, Any], threads: int | None) -> None:
@@ -200,7 +200,7 @@ class Simulation:
                     engine.advance_until(time, seconds)
             return engine.time >= time
 
-    def steps(self, every: float, until: float | None = None) -> Iterator[dict[str, NDArray[Any]]]:
+    def steps(self, every: float, until: float | None = None) -> Iterator[Arrays]:
         """Step to the next multiple of `every` [D/U], yield a :meth:`snapshot`, and so on until `until`."""
         if not 0 < _number("every", every) < math.inf:
             raise ConfigError(f"every = {every}: must be a positive number [D/U]")
@@ -209,7 +209,7 @@ class Simulation:
             self.run_until(min(next_multiple(self.time, every), until))
             yield self.snapshot()
 
-    def snapshot(self) -> dict[str, NDArray[Any]]:
+    def snapshot(self) -> Arrays:
         """Return the particles.
 
         Returns
@@ -222,7 +222,7 @@ class Simulation:
         with self._engine() as engine:
             return engine.snapshot()
 
-    def breakdown(self) -> list[tuple[float, dict[str, NDArray[Any]]]]:
+    def breakdown(self) -> list[tuple[float, Arrays]]:
         """Return time and particles, as :meth:`snapshot` does, before and after the step that broke down.
 
         Those after it are at the positions before it. If no step has broken down, the present ones are all.
@@ -231,7 +231,7 @@ class Simulation:
             before, after = engine.snapshot(), engine.failed_snapshot()
         return [(self.time, before)] + ([] if after is None else [(math.nextafter(self.time, math.inf), after)])
 
-    def history(self) -> dict[str, NDArray[Any]]:
+    def history(self) -> Arrays:
         """Return one row for each step taken so far.
 
         Returns
@@ -245,7 +245,7 @@ class Simulation:
         self._history = [{name: np.concatenate([rows[name] for rows in self._history]) for name in self._history[0]}]
         return self._history[0]
 
-    def new_history(self, *, keep: bool = True) -> dict[str, NDArray[Any]]:
+    def new_history(self, *, keep: bool = True) -> Arrays:
         """Return the rows of the history since the last call of this method or of :meth:`history`.
 
         Unless they are to be kept for :meth:`history`, which takes memory as long as the simulation lives.
@@ -259,7 +259,7 @@ class Simulation:
             self._history.append(rows)
         return rows
 
-    def _coefficients(self, rows: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    def _coefficients(self, rows: Arrays) -> Arrays:
         """Drag and lift coefficients of the case's bodies with their parts: force / (½ρU²A), eqs. (21) and (22)."""
         names = [body["name"] for body in self.problem.settings["bodies"]]
         bodies = [names.index(name) for name in self.problem.coefficient_bodies if name in names]
@@ -267,7 +267,7 @@ class Simulation:
             return {}
         scale = 2 / self.problem.reference_area
         pressure, viscous = (scale * rows[f"{part}_force"][:, bodies].sum(axis=1) for part in ("pressure", "viscous"))
-        columns: dict[str, NDArray[Any]] = {}
+        columns: Arrays = {}
         for axis, name in enumerate(("drag", "lift")):
             columns |= {
                 f"{name}_coefficient": pressure[:, axis] + viscous[:, axis],

@@ -3,18 +3,15 @@
 import csv
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-from numpy.typing import NDArray
-
-from alsph.arrays import AXES
+from alsph.arrays import AXES, Arrays
 from alsph.folder.durable import replacing
 
 UNKNOWN = "nan"
 """What stands in it for what an older alsph did not record."""
 
 
-def flatten(rows: dict[str, NDArray[Any]], bodies: list[str]) -> dict[str, NDArray[Any]]:
+def flatten(rows: Arrays, bodies: list[str]) -> Arrays:
     """Return the history with vectors split into one column a component, ``BODY_pressure_force_x`` and so on."""
     columns = {}
     for name, values in rows.items():
@@ -27,7 +24,7 @@ def flatten(rows: dict[str, NDArray[Any]], bodies: list[str]) -> dict[str, NDArr
     return columns
 
 
-def lines(columns: dict[str, NDArray[Any]]) -> Iterator[dict[str, str]]:
+def lines(columns: Arrays) -> Iterator[dict[str, str]]:
     """Yield the rows of what :func:`flatten` gives as they stand in the file, by column."""
     texts = (map(_text, column.tolist()) for column in columns.values())
     return (dict(zip(columns, row, strict=True)) for row in zip(*texts, strict=True))
@@ -50,7 +47,7 @@ def _names_columns(line: bytes) -> bool:
     return line.startswith(b"step,") and line.endswith(b"\n")
 
 
-def append(path: Path, columns: dict[str, NDArray[Any]], order: list[str]) -> None:
+def append(path: Path, columns: Arrays, order: list[str]) -> None:
     """Append what :func:`flatten` gives to a file whose columns have this order, and begin one that is not there."""
     with path.open("a", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, order, restval=UNKNOWN, lineterminator="\n")

@@ -21,9 +21,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import filelock
-from numpy.typing import NDArray
 
-from alsph.arrays import size_of
+from alsph.arrays import Arrays, size_of
 from alsph.engine.output import Output
 from alsph.engine.prescribed import Prescription
 from alsph.errors import DamagedError, RunFolderError
@@ -216,7 +215,7 @@ class RunFolder:
         with self._writing(), self._file("run.log").open("a", encoding="utf-8") as file:
             file.write(f"{clock.strftime('%Y-%m-%d %H:%M:%S')}  {printable(line)}\n")
 
-    def append_history(self, rows: dict[str, NDArray[Any]], bodies: list[str]) -> None:
+    def append_history(self, rows: Arrays, bodies: list[str]) -> None:
         """Append rows of :meth:`alsph.Simulation.new_history` to ``history.csv``.
 
         That of an older alsph is given the columns that it lacks first.
@@ -232,7 +231,7 @@ class RunFolder:
                 history.widen(path, missing)
             history.append(path, columns, [*known, *missing])
 
-    def append_particles(self, time: float, particles: dict[str, NDArray[Any]]) -> None:
+    def append_particles(self, time: float, particles: Arrays) -> None:
         """Append an output to ``particles.vtkhdf``."""
         self.append("particles.vtkhdf", lambda path: vtkhdf.append(path, time, particles), size_of(particles))
 
@@ -268,7 +267,7 @@ class RunFolder:
             except Exception as error:
                 raise RunFolderError(f"{self.path}: output {output.file}: {type(error).__name__}: {error}") from error
 
-    def write_breakdown(self, outputs: list[tuple[float, dict[str, NDArray[Any]]]]) -> Path:
+    def write_breakdown(self, outputs: list[tuple[float, Arrays]]) -> Path:
         """Replace ``breakdown.vtkhdf``: the particles before and after the step that broke down."""
         self._make_room(sum(size_of(particles) for _, particles in outputs))
         path = self._file("breakdown.vtkhdf")

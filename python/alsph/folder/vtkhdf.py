@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from alsph.arrays import Arrays
 from alsph.folder.durable import growing
 from alsph.folder.reading import sound
 
@@ -31,7 +32,7 @@ FIELDS_OF_SURFACES: dict[str, type[np.generic]] = {"place": np.uint8}
 """Those of a fluid with a free surface."""
 
 
-def append(path: Path, time: float, particles: dict[str, NDArray[Any]]) -> None:
+def append(path: Path, time: float, particles: Arrays) -> None:
     """Append the particles at one time to the file, and create it if it does not exist.
 
     Parameters
@@ -95,7 +96,7 @@ def write_image(
             root.create_dataset(f"PointData/{name}", data=table, compression="gzip", shuffle=True)
 
 
-def _create(file: h5py.File, points: NDArray[Any], columns: dict[str, NDArray[Any]]) -> h5py.Group:
+def _create(file: h5py.File, points: NDArray[Any], columns: Arrays) -> h5py.Group:
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 0])
     root.attrs.create("Type", b"PolyData", dtype=h5py.string_dtype("ascii", len("PolyData")))
@@ -116,7 +117,7 @@ def _create(file: h5py.File, points: NDArray[Any], columns: dict[str, NDArray[An
     return root
 
 
-def _append_part(root: h5py.Group, time: float, points: NDArray[Any], columns: dict[str, NDArray[Any]]) -> None:
+def _append_part(root: h5py.Group, time: float, points: NDArray[Any], columns: Arrays) -> None:
     part, count = int(root["Steps"].attrs["NSteps"]), len(points)
     start = int(root["NumberOfPoints"][:part].sum())
     _write(root["NumberOfPoints"], part, count)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.geometry.domain import Domain
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def particles(
     body: ArrayLike = 0,
     normal: ArrayLike = 0.0,
     depth: ArrayLike = 0.0,
-) -> dict[str, NDArray[Any]]:
+) -> Arrays:
     """Return the arrays of n particles of one kind; every other property is broadcast to `position` (n, d)."""
     n = len(position)
     return {
@@ -97,6 +97,6 @@ def particles(
     }
 
 
-def join(*groups: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def join(*groups: Arrays) -> Arrays:
     """Concatenate groups of particles."""
     return {name: np.concatenate([group[name] for group in groups]) for name in groups[0]}

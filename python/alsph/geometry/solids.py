@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 from shapely import Polygon
 
-from alsph.arrays import FloatArray
+from alsph.arrays import Arrays, FloatArray
 from alsph.geometry.lattice import cell_centres, cells, extruded, inside
 from alsph.geometry.particles import Kind, neighbour_tree, particles
 
@@ -52,7 +51,7 @@ class Solid:
         flip = np.array([1.0, -1.0])
         return Solid(self.position * flip, self.normal * flip, self.depth)
 
-    def particles(self, velocity: ArrayLike = 0.0, body: ArrayLike = 0) -> dict[str, NDArray[Any]]:
+    def particles(self, velocity: ArrayLike = 0.0, body: ArrayLike = 0) -> Arrays:
         """Return the arrays of these particles as part of the body with that index, or each of its own (n,)."""
         return particles(Kind.SOLID, self.position, velocity, body=body, normal=self.normal, depth=self.depth)
 

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from alsph.arrays import AXES, FloatArray
+from alsph.arrays import AXES, Arrays, FloatArray
 from alsph.cases import Bodies, Case, remarks
 from alsph.geometry.particles import Kind, particles
 from alsph.geometry.plane import Plane
@@ -57,9 +57,6 @@ NEAR = 8.0
 
 CHANGED = 1e-3
 """Share of a body's area that must be cut off or filled for its outline as it was given to be drawn, too."""
-
-State = dict[str, NDArray[Any]]
-"""Particles."""
 
 View = tuple[float, float, float, float]
 """Left, right, bottom and top [D]."""
@@ -111,7 +108,7 @@ class Setup:
         return float(left), float(right), float(bottom), float(top)
 
 
-def start(case: Case, state: State | None = None, points: FloatArray | None = None) -> Figure:
+def start(case: Case, state: Arrays | None = None, points: FloatArray | None = None) -> Figure:
     """Picture of what a run starts with: particles, outlines, the thinnest part, sides and recorded points.
 
     In 3-D it is of the slice that pictures of the run show. Bodies that are too thin for the resolution are drawn
@@ -142,14 +139,14 @@ def start(case: Case, state: State | None = None, points: FloatArray | None = No
     return figure
 
 
-def _particles(case: Case) -> State:
+def _particles(case: Case) -> Arrays:
     """Return the particles that a case starts with; none of one whose bodies are too thin."""
     if isinstance(case, Bodies) and remarks.refusal(case.remarks()):
         return particles(Kind.FLUID, np.empty((0, 2)), 0.0)
     return case.build().state
 
 
-def _found(case: Case, state: State, points: FloatArray | None, plane: tuple[int, int]) -> Setup:
+def _found(case: Case, state: Arrays, points: FloatArray | None, plane: tuple[int, int]) -> Setup:
     """Return what is drawn of the start of a case, in 3-D of particles within Δx of a plane through its middle."""
     for axis in set(range(case.space_dimensions)) - set(plane):
         near = np.abs(state["position"][:, axis] - case.middle[axis]) <= case.particle_spacing
@@ -172,7 +169,7 @@ def _found(case: Case, state: State, points: FloatArray | None, plane: tuple[int
     )
 
 
-def _extent(case: Case, state: State, plane: tuple[int, int]) -> View | None:
+def _extent(case: Case, state: Arrays, plane: tuple[int, int]) -> View | None:
     """Return what the bodies that forces are those of extend over; None if there are none."""
     if isinstance(case, Bodies):
         left, bottom, right, top = np.array(case.bounds) + np.tile(case.centre, 2)

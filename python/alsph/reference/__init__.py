@@ -1,6 +1,7 @@
 """Independent reference solutions that runs are compared with; README.md beside this file names their source."""
 
 import csv
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,6 +64,20 @@ def rows(name: str) -> list[dict[str, str]]:
 def row(name: str, reynolds: float, column: str = "Re") -> dict[str, str] | None:
     """Return the row of a CSV file of this folder with that Reynolds number in `column`, None where there is none."""
     return next((row for row in rows(name) if float(row[column]) == reynolds), None)
+
+
+def matching(name: str, given: Mapping[str, float | str]) -> dict[str, float]:
+    """Return the numbers of the first row of a CSV file of this folder whose columns have what is `given`.
+
+    An empty cell is NaN; columns that are given in words are left out. Nothing if there is no such row.
+    """
+    words = [column for column, value in given.items() if isinstance(value, str)]
+    for row in rows(name):
+        named = all(row.pop(word) == given[word] for word in words)
+        numbers = {column: float(cell or "nan") for column, cell in row.items()}
+        if named and all(numbers[column] == value for column, value in given.items() if column not in words):
+            return numbers
+    return {}
 
 
 def table(name: str) -> FloatArray:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 import time as clock
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from alsph.arrays import Arrays
 from alsph.cases import Body, Body3D
 from alsph.config import Config
 from alsph.engine.simulation import Simulation
@@ -20,10 +19,8 @@ from alsph.units import Units
 
 PROBE_SECONDS = 5.0
 
-State = dict[str, NDArray[Any]]
 
-
-def starting(config: Config) -> State:
+def starting(config: Config) -> Arrays:
     """Return the particles that a run starts with.
 
     Raises
@@ -35,7 +32,7 @@ def starting(config: Config) -> State:
     return config.case.build().state
 
 
-def describe(config: Config, state: State | None = None, *, probe: bool = True) -> list[tuple[str, str]]:
+def describe(config: Config, state: Arrays | None = None, *, probe: bool = True) -> list[tuple[str, str]]:
     """Return particles, memory, time step limits, steps and estimated time of a run, in words.
 
     Parameters

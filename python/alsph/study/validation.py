@@ -125,6 +125,7 @@ FULL = (
     Entry("oscillating_cylinder", (20, 32), until=15.0),
     Entry("towed_cylinder", (10, 20), until=6.0),
     Entry("settling_sphere", (8,), until=12.0),
+    Entry("sphere", (8, 10), until=15.0, parameters={"quarter": True}),
     Entry("dam_break", (20, 40, 80), until=8.0),
     Entry("dam_break", (20, 40), until=2.0, parameters={"length": 0.5}),
     Entry("dam_break", (20, 40), until=2.0, parameters={"length": 1.0}),
