@@ -1,5 +1,7 @@
 """What a run is judged by: numbers and profiles beside their reference values."""
 
+from __future__ import annotations
+
 import math
 import re
 from dataclasses import dataclass, replace
@@ -8,6 +10,7 @@ from typing import Self
 import numpy as np
 
 from alsph.analysis.averages import Estimate
+from alsph.analysis.window import DEVELOPING
 from alsph.arrays import FloatArray
 from alsph.tables import html
 
@@ -39,6 +42,15 @@ class Measure:
     def alone(self) -> Self | None:
         """Return it without its reference, None if it is an error norm."""
         return None if self.reference == 0 else replace(self, reference=math.nan, tolerance=math.nan, source="")
+
+    def settling(self, before: Measure) -> Self:
+        """Return it, noted to develop if it has changed since `before` by more than half its tolerance (0.5 %)."""
+        scale = abs(self.value) if self.reference else 1.0
+        change = abs(self.value - before.value)
+        if not change > scale * (0.005 if math.isnan(self.tolerance) else self.tolerance / 2):
+            return self
+        note = f"{DEVELOPING} (changes from {before.value:.4g} over the last quarter of the run)"
+        return replace(self, value=Estimate(self.value, note=note))
 
     @property
     def error(self) -> float:

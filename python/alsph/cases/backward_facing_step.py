@@ -29,7 +29,7 @@ class BackwardFacingStep(Duct):
 
     name: ClassVar[str] = "backward_facing_step"
     title: ClassVar[str] = "flow over a backward-facing step"
-    steady: ClassVar[bool] = True
+    is_steady: ClassVar[bool] = True
     velocity_max: ClassVar[float] = 1.5
 
     reynolds: float = Field(default=100.0, gt=0, description="Reynolds number 2hU/ν, h the inlet channel's height [-]")

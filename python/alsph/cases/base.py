@@ -68,7 +68,7 @@ class Case(Discretised):
     title: ClassVar[str]
     settles: ClassVar[bool] = True
     """Whether the flow may become steady or periodic; if not, averages are of the whole run, without ±."""
-    steady: ClassVar[bool] = False
+    is_steady: ClassVar[bool] = False
     """Whether measures are of the steady flow late in a run; they are said to develop where they change until then."""
     from_start: ClassVar[bool] = False
     """Whether references are of the flow from its own start on, not of one that goes on with another run's."""

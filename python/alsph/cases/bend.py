@@ -39,7 +39,7 @@ class Bend(Duct):
 
     name: ClassVar[str] = "bend"
     title: ClassVar[str] = "flow through a plane bend of 90 degrees"
-    steady: ClassVar[bool] = True
+    is_steady: ClassVar[bool] = True
     velocity_max: ClassVar[float] = 2.0
     later_names: ClassVar[tuple[str, ...]] = ("force on the bend",)
 

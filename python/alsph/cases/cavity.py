@@ -48,7 +48,7 @@ class Cavity(Case):
 
     name: ClassVar[str] = "cavity"
     title: ClassVar[str] = "lid-driven cavity"
-    steady: ClassVar[bool] = True
+    is_steady: ClassVar[bool] = True
 
     resolution: int = Field(default=50, ge=8, description="particles per side of the cavity, D/Δx [-]")
     lid: Literal["slides", "in_place"] = Field(

@@ -23,6 +23,8 @@ RADIUS = 0.5
 
 COURANT = 0.02
 """Courant number where none is given: pressure that travels as waves is to cross the vessel often in 0.1 √(D/g)."""
+INVISCID = 3000.0
+"""Reynolds number from which on viscosity does not matter to the acceleration within its tolerance."""
 SOURCE = "exact, of a fluid without viscosity: (m - ρA) g / (m + C_a ρA), C_a = (b² + a²)/(b² - a²)"
 
 
@@ -113,10 +115,18 @@ class ConcentricRelease(Case):
         """That of the cylinder at the start, in a fluid without viscosity, upwards [g]."""
         return (1 - self.density_ratio) / (self.density_ratio + self.added_mass_coefficient)
 
+    @property
+    def no_reference(self) -> str:
+        """Say that the fluid is too viscous."""
+        if self.reynolds >= INVISCID:
+            return ""
+        return f"it is of a fluid without viscosity, and holds from Re = {INVISCID:g} on"
+
     def measures(self, run: Record) -> list[Measure]:
         """Return the mean acceleration over the first tenth of √(D/g), in which the cylinder moves but little."""
         time, velocity = run.history["time"], run.history.get("cylinder_velocity_y", np.empty(0))
         name = "acceleration over the first 0.1 √(D/g), g"
         if not len(velocity) or time[-1] < 0.1:
             return [Measure(name, math.nan)]
-        return [Measure(name, float(np.interp(0.1, time, velocity) / 0.1), self.acceleration, 0.03, SOURCE)]
+        found = float(np.interp(0.1, time, velocity) / 0.1)
+        return self.compared([Measure(name, found, self.acceleration, 0.03, SOURCE)])

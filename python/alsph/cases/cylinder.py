@@ -17,7 +17,7 @@ from alsph.geometry.surface import Surface, circle
 from alsph.reference import Reference
 
 RADIUS = 0.5
-FAR = {"height": 60.0, "upstream": 15.0}
+FAR = {"height": 60.0, "upstream": 15.0, "length": 40.0}
 """Dimensions [D] from which on the sides no longer act on the cylinder."""
 
 UNKNOWN = "not validated: this channel; what has no slip or is off centre is compared as confined_cylinder comes"

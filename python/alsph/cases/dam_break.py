@@ -293,7 +293,7 @@ class DamBreak(FreeSurface):
         nothing = np.empty(0), np.empty(0)
         clock = "$t\\sqrt{g/H}$"
         time, front = Front.read(run)
-        known = tuple(reference.table("dam_break_front.csv")) if self._is_compared and not self.no_reference else nothing
+        known = tuple(reference.table("dam_break_front.csv")) if self._is_compared else nothing
         axes = clock, "front $x/H$"
         drawn = [Profile("front", axes, (time, front[0]), known, COMPUTATION)]
         for column in COLUMNS.get(self.length, ()):

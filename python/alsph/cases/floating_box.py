@@ -31,8 +31,8 @@ SHOWN = 2.0
 class FloatingBox(FreeSurface):
     """A box that floats in a tank with slip walls, free to move and to turn; let go above its draught it heaves.
 
-    The tank is filled to the depth H but for the box's part below the water; sizes of the box are taken to whole
-    spacings, and its density so that its draught is. At rest it displaces its weight (Archimedes).
+    The tank is filled to the depth H but for the box's part below the water; sizes of the box and the lift are taken to
+    whole spacings, and its density so that its draught is. At rest it displaces its weight (Archimedes).
     """
 
     name: ClassVar[str] = "floating_box"
@@ -80,6 +80,41 @@ class FloatingBox(FreeSurface):
     def draught(self) -> float:
         """Depth that the box is immersed to at rest, to whole spacings [H]."""
         return float(self.whole(self.density_ratio * self.size[1]))
+
+    @property
+    def metacentric_height(self) -> float:
+        """Height of the metacentre over the centre of gravity [H]: below zero the box does not float upright."""
+        (length, height), draught = self.size, self.draught
+        return draught / 2 + length**2 / (12 * draught) - height / 2
+
+    def remarks(self) -> list[str]:
+        """Return what is rounded to whole spacings, what is too small for them, and that the box does not float so."""
+        length, height = self.size
+        taken = {
+            "box_length": (self.box_length, length),
+            "box_height": (self.box_height, height),
+            "density_ratio": (self.density_ratio, self.draught / height),
+            "lift": (self.lift, self._whole_lift),
+        }
+        rounded = [
+            f"{name} {to:.4g} for {asked:g}"
+            for name, (asked, to) in taken.items()
+            if abs(to - asked) > 0.01 * abs(asked)
+        ]
+        coarse = [
+            f"{name} of {size * self.resolution:.3g} Δx"
+            for name, size, least in (("draught", self.draught, 4), ("lift", abs(self._whole_lift), 2))
+            if 0 < size < (least - 0.5) * self.particle_spacing
+        ]
+        found = super().remarks()
+        if rounded:
+            found.append(f"rounded: sizes to whole particle spacings, {', '.join(rounded)}")
+        if coarse:
+            found.append(f"coarse: a {' and a '.join(coarse)}; the motion is some tenths of the lift off")
+        if self.metacentric_height < 0:
+            told = f"its metacentre lies {-self.metacentric_height:.3g} H below its centre of gravity"
+            found.append(f"unstable: the box does not float upright, {told}, and turns sooner or later")
+        return found
 
     @property
     def default_until(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, Self
 
 import numpy as np
@@ -31,7 +32,7 @@ class Nozzle(Duct):
 
     name: ClassVar[str] = "nozzle"
     title: ClassVar[str] = "flow through a plane nozzle"
-    steady: ClassVar[bool] = True
+    is_steady: ClassVar[bool] = True
     velocity_max: ClassVar[float] = 1.5
 
     reynolds: float = Field(default=50.0, gt=0, description="Reynolds number UD/ν, of the outlet channel [-]")
@@ -45,7 +46,12 @@ class Nozzle(Duct):
     def _fits(self) -> Self:
         for name in ("upstream", "transition", "downstream"):
             self.whole_cells(name, getattr(self, name))
-        self.whole_cells("contraction: the step on each side, (contraction - 1)/2", (self.contraction - 1) / 2)
+        steps = (self.contraction - 1) / 2 * self.resolution
+        if abs(steps - round(steps)) > 1e-6:
+            whole = [count for count in (math.floor(steps), math.ceil(steps)) if count]
+            near = [f"{1 + 2 * count / self.resolution:.6g}" for count in whole]
+            told = f"the step on each side, (contraction - 1)/2, is no whole number of spacings (1/{self.resolution})"
+            raise ValueError(f"contraction = {self.contraction:g}: {told}; use {' or '.join(near)}")
         return self
 
     @property

@@ -30,6 +30,9 @@ STATIONS = (-0.6, 0.0, 0.6, 1.2)
 BESIDE = 0.01
 """How far [T] a snapshot may be from such a phase: the cylinder's velocity changes by at most 0.06 U in so much."""
 
+LONG = 5.0
+"""Way [D] that pressure travels in a period: with less the force is not that of an incompressible fluid."""
+
 EXPERIMENT = "experiment (Dütsch et al. 1998)"
 SOURCE = "vorticity and stream function on a log-polar grid to 40 D, extrapolated"
 
@@ -69,6 +72,14 @@ class OscillatingCylinder(MovingCylinder):
     def default_until(self) -> float:
         """Three periods."""
         return 3 * self.period
+
+    def remarks(self) -> list[str]:
+        """Return what is to be borne in mind: pressure that answers as waves not much longer than the cylinder."""
+        length = self.period * self.expected_penalty_constant() ** 0.5
+        if self.scheme not in (None, "alsph") or length >= LONG:
+            return super().remarks()
+        told = f"it travels {length:.2g} D in a period; with less than {LONG:g} D the added mass is some 10 % wrong"
+        return [*super().remarks(), f"slow pressure: {told}; take a smaller courant"]
 
     def motion(self, position: FloatArray, time: float) -> ArrayLike:
         """Return how far the cylinder has come [D]."""

@@ -18,6 +18,7 @@ from alsph.cases.base import Case
 class ParallelFlow(Case):
     """Parallel flow between no-slip walls, periodic along x, whose velocity depends on one coordinate across alone."""
 
+    from_start: ClassVar[bool] = True
     source: ClassVar[str]
     coordinate: ClassVar[str]
     """The coordinate, for the axis of a picture."""
@@ -27,13 +28,23 @@ class ParallelFlow(Case):
 
     reynolds: float = Field(default=10.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=40, ge=8, description="particles between the walls, D/Δx [-]")
-    length: float = Field(default=0.5, gt=0, description="period along the walls [D]")
+    length: float = Field(default=0.5, gt=0, description="period along the walls, taken to whole spacings [D]")
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        if self.whole_cells("length", self.length) < self.support_layers:
+        if self._columns < self.support_layers:
             raise ValueError(f"length = {self.length:g}: shorter than the kernel's support radius; use a longer one")
         return self
+
+    @property
+    def _columns(self) -> int:
+        """Particle spacings in a period."""
+        return round(self.length * self.resolution)
+
+    @property
+    def _period(self) -> float:
+        """The period, to a whole number of spacings [D]."""
+        return self._columns / self.resolution
 
     @abstractmethod
     def place(self, position: FloatArray) -> FloatArray:

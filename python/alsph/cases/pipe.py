@@ -60,18 +60,18 @@ class Pipe(ParallelFlow):
         """Return one period; the wall closes it around."""
         return Domain(
             (0, -RADIUS, -RADIUS),
-            (self.length, RADIUS, RADIUS),
+            (self._period, RADIUS, RADIUS),
             [("periodic", "periodic"), ("none", "none"), ("none", "none")],
         )
 
     def bodies(self) -> list[SolidBody]:
         """Return the wall, at rest."""
-        return [SolidBody("wall", (self.length / 2, 0, 0))]
+        return [SolidBody("wall", (self._period / 2, 0, 0))]
 
     def particle_estimate(self) -> int:
         """Return about how many particles there are."""
         radius = RADIUS * self.resolution + self.support_layers
-        return round(self.length * self.resolution * np.pi * radius**2)
+        return round(self._period * self.resolution * np.pi * radius**2)
 
     def particles(self) -> Arrays:
         """Return sections of evenly spaced fluid and of rings of wall, one behind the other."""
@@ -81,5 +81,5 @@ class Pipe(ParallelFlow):
         corner = np.full(2, RADIUS)
         outside = Volume(lambda points: RADIUS - np.hypot(*points.T), -corner, corner, 1 - np.pi * RADIUS**2, 1.0)
         section = pack(cells, outside, wall.position, spacing)
-        columns = cell_centres(self.whole_cells("length", self.length), spacing)
+        columns = cell_centres(self._columns, spacing)
         return join(particles(Kind.FLUID, extruded(columns, section), 0.0), wall.extruded(columns).particles())

@@ -40,19 +40,19 @@ class Plates(ParallelFlow):
 
     def domain(self) -> Domain:
         """Return one period; solid particles close it below and above."""
-        return Domain((0, 0), (self.length, 1), [("periodic", "periodic"), ("none", "none")])
+        return Domain((0, 0), (self._period, 1), [("periodic", "periodic"), ("none", "none")])
 
     def bodies(self) -> list[SolidBody]:
         """Return the plates, which slide in place."""
-        middle = self.length / 2, 0.5
+        middle = self._period / 2, 0.5
         return [SolidBody("lower", middle), SolidBody("upper", middle, (self.upper_velocity, 0))]
 
     def particles(self) -> Arrays:
         """Return a lattice of fluid between the solid particles of the plates."""
-        region = shapely.box(0, 0, self.length, 1)
+        region = shapely.box(0, 0, self._period, 1)
         solid = walls(region, self.particle_spacing, self.support_layers)
         x, y = solid.position.T
-        period = (x > 0) & (x < self.length)
+        period = (x > 0) & (x < self._period)
         fluid = cells(region, self.particle_spacing)
         return join(
             particles(Kind.FLUID, fluid, self.initial_profile(fluid[:, 1])[:, None] * [1.0, 0.0]),

@@ -26,6 +26,9 @@ RADIUS = 0.5
 END = 2.0
 """Distance of the sphere's centre from the end of the column that it begins at, and about where a run ends [D]."""
 
+WIDE = 6.0
+"""Width of a column whose sides raise the drag by some 1 % [D]."""
+
 START = 6.0
 """Way in which it comes to its velocity [D]."""
 
@@ -131,6 +134,13 @@ class SettlingSphere(Case):
         """Return how far points (n, 3) lie outside of the sphere where it begins [D]."""
         return np.asarray(np.linalg.norm(position - self.centre, axis=1) - RADIUS)
 
+    @property
+    def no_reference(self) -> str:
+        """Say that the column is too narrow."""
+        if self.width >= WIDE:
+            return ""
+        return f"it is of a sphere far from all walls, and holds within 2 % in columns {WIDE:g} D wide or more"
+
     def measures(self, run: Record) -> list[Measure]:
         """Return the settling velocity over the last two diameters, and the drag coefficient there."""
         way, speed = (np.abs(run.history.get(f"sphere_{name}_z", np.empty(0))) for name in ("displacement", "velocity"))
@@ -141,11 +151,12 @@ class SettlingSphere(Case):
         drag, own = 4 / 3 / velocity**2, velocity * self.reynolds
         known = reference.table("sphere_drag.csv")
         expected = float(np.interp(own, *known)) if known[0][0] <= own <= known[0][-1] else math.nan
-        return [
+        found = [
             Measure("settling velocity over the last two diameters", velocity),
             Measure("Reynolds number of the sphere", own),
             Measure("drag coefficient", drag, expected, 0.05, "Johnson and Patel (1999), a sphere far from all walls"),
         ]
+        return self.compared(found)
 
     def profiles(self, run: Record) -> list[Profile]:
         """Return the velocity over time."""

@@ -23,6 +23,9 @@ from alsph.geometry.lattice import cell_centres, lattice
 LINEAR = 0.005
 """Amplitude of the sway [H] up to which linear theory is the reference: it leaves out what is of its square."""
 
+SMALL = 0.02
+"""Elevation at the gauge [H] up to which it is: near resonance, at 0.14 H, it errs by 12 %."""
+
 IRROTATIONAL = (12, 16)
 """Modes of the theory of an irrotational wave, and those that tell how far to trust it: while both agree within..."""
 
@@ -110,8 +113,9 @@ def _irrotational_level(
 class Sloshing(FreeSurface):
     """Water of depth H in a tank with slip walls that sways along x, seen from the tank.
 
-    By default it is the experiment of Faltinsen et al. (2000). With an amplitude of up to 0.005 H the reference is
-    linear theory, else that of an irrotational wave of any height as long as it does not break.
+    By default it is the experiment of Faltinsen et al. (2000). With an amplitude of up to 0.005 H and an elevation of
+    up to 0.02 H the reference is linear theory, else that of an irrotational wave of any height as long as it does not
+    break.
     """
 
     name: ClassVar[str] = "sloshing"
@@ -219,8 +223,9 @@ class Sloshing(FreeSurface):
 
     def _theory(self, time: FloatArray) -> tuple[tuple[FloatArray, FloatArray], str, float]:
         """Return times and elevation of theory up to the last of these times, which it is, and how near it is to be."""
-        if self.amplitude <= LINEAR:
-            return (time, self.linear_level(time, self.gauge)), "linear theory", 0.03
+        level = self.linear_level(time, self.gauge)
+        if self.amplitude <= LINEAR and np.abs(level).max() <= SMALL:
+            return (time, level), "linear theory", 0.03
         size = (self._whole_length, self.amplitude, self.frequency, np.radians(self.phase), self.gauge)
         return irrotational_level(*size, float(time[-1])), "theory of an irrotational wave", 0.05
 

@@ -17,6 +17,9 @@ from alsph.geometry.lattice import cell_centres, lattice
 WAVE = np.pi
 """Wave number k [1/H]: half a wave in a tank as long as it is deep."""
 
+VISCOUS = 50.0
+"""Reynolds number below which the flow that begins at rest is not that of the mode alone, by more than 1 %."""
+
 
 class StandingWave(FreeSurface):
     """Half a wave in a square tank of water H deep with slip walls, let go from rest.
@@ -83,6 +86,13 @@ class StandingWave(FreeSurface):
         told = f"steep: a wave of ka = {WAVE * self.amplitude:.2g} is compared with linear theory"
         return super().remarks() + [f"{told}; its frequency is about {100 * steep:.2g} % lower"] * (steep > 0.005)
 
+    @property
+    def no_reference(self) -> str:
+        """Say that the water is so viscous that what is let go from rest is not the mode of linear theory alone."""
+        if self.reynolds >= VISCOUS:
+            return ""
+        return f"it is of a mode of linear theory, and what is let go from rest is that from Re = {VISCOUS:g} on"
+
     def measures(self, run: Record) -> list[Measure]:
         """Return frequency and decay rate, from the kinetic energy, and what energy was made."""
         from scipy.optimize import curve_fit
@@ -101,8 +111,8 @@ class StandingWave(FreeSurface):
         except RuntimeError:  # it is no such oscillation
             return rows
         source = "linear theory of a viscous fluid"
-        return [
+        found = [
             Measure("frequency of the wave, √(g/H)", float(frequency), exact.imag, 0.01, source),
             Measure("decay rate of the amplitude, √(g/H)", float(decay), -exact.real, 0.1, source),
-            *rows,
         ]
+        return self.compared(found) + rows

@@ -15,6 +15,9 @@ DIVERGENCE = 0.02
 
 FEW_PERIODS = 5
 
+MOST_AT_SURFACE = 0.5
+"""Share of the fluid at its surface from which on it is remarked upon."""
+
 BACKFLOW = 0.01
 """Share of an outlet's buffer that comes back, in the mean over the window, from which on it is remarked upon."""
 
@@ -34,7 +37,7 @@ def outcome(run: Record, until: str) -> list[str]:
         if has_surface(run.history):
             remedy = "particles at the surface and alone in the air count, too; more projection_sweeps lower it"
         found.append(f"not divergence-free: {text}; {remedy}")
-    found += [*lost(run), *backflow(run)]
+    found += [*lost(run), *thinned(run.history), *backflow(run)]
     if run.body and run.window.edges.size:
         found += unsettled(run.window)
         if run.drag.mean < 0 and not (has_moved(run.history) or has_surface(run.history)):
@@ -80,6 +83,15 @@ def lost(run: Record) -> list[str]:
         return []
     share = f"{100 * (1 - fluid[-1] / fluid.max()):.2g} %"
     return [f"lost: {share} of the fluid has left through the sides open to the air; a larger domain keeps it"]
+
+
+def thinned(history: Mapping[str, FloatArray]) -> list[str]:
+    """Remark on fluid of which so much is taken for its surface, which carries no pressure, that little is inside."""
+    surface, fluid = (np.nan_to_num(history.get(name, np.empty(0))) for name in ("surface", "fluid"))
+    if not has_surface(history) or (share := (surface / fluid)[-1]) < MOST_AT_SURFACE:
+        return []
+    text = f"{100 * share:.2g} % of the fluid counts as surface at the end, and carries no pressure"
+    return [f"thin: {text}: sheets of two particles, or, at any resolution, fluid drawn out to more than 2.6 times"]
 
 
 def backflow(run: Record) -> list[str]:

@@ -42,6 +42,23 @@ if TYPE_CHECKING:
 STREAMLINE_CELLS = 300
 """Along the longer side of a picture, at most."""
 
+ELSEWHERE = "no reference: it is of the flow from the case's own start on, and this run goes on with another's"
+"""The remark on a run that an initial run takes its reference."""
+
+
+class _Until:
+    """What a run was when a share of its time had gone, as far as its snapshots tell; the rest is the run's."""
+
+    def __init__(self, run: Run, share: float) -> None:
+        self._run = run
+        self.times = run.times[run.times <= share * run.times[-1:]]
+
+    def snapshot(self, time: float | None = None) -> Snapshot:
+        return self._run.snapshot(self.times[-1] if time is None else time)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._run, name)
+
 
 class Run(Loads):
     """The results in a run folder, finished or not, read when they are first asked for.
@@ -108,7 +125,20 @@ class Run(Loads):
                 raise
             what = reason(error, case.code.file if case.code else "<cell>")
             return [], [f"no measures: those of {type(case).__name__} fail, {what}; correct the file that defines it"]
-        return [alone for measure in found if (alone := measure.alone())] if case.is_driven else found, []
+        if case.is_driven or self._goes_on_elsewhere:
+            return [alone for measure in found if (alone := measure.alone())], []
+        return self._settled(found) if case.is_steady else found, []
+
+    @property
+    def _goes_on_elsewhere(self) -> bool:
+        """Whether the run goes on with the flow of another, where references are of the case's own start."""
+        begun = self.info["start"].get("initial_run") if "start" in self.info else self.config.run.initial_run
+        return self.config.case.from_start and bool(begun)
+
+    def _settled(self, found: list[Measure]) -> list[Measure]:
+        """Return measures of a steady flow with a note on those that are another than a quarter of the run before."""
+        before = {measure.name: measure for measure in self.config.case.measures(_Until(self, 0.75))}
+        return [measure.settling(before[measure.name]) if measure.name in before else measure for measure in found]
 
     @cached_property
     def gauges(self) -> GaugeRecord:
@@ -120,7 +150,9 @@ class Run(Loads):
     def profiles(self) -> list[Profile]:
         """Curves of the run beside their reference curves."""
         found = self.config.case.profiles(self)
-        return [profile.alone() for profile in found] if self.config.case.is_driven else found
+        case = self.config.case
+        alone = case.is_driven or case.no_reference or self._goes_on_elsewhere
+        return [profile.alone() for profile in found] if alone else found
 
     @cached_property
     def ledger(self) -> Ledger:
@@ -140,6 +172,7 @@ class Run(Loads):
             *solved,
             *made(self.measures),
             *self._judged[1],
+            *([ELSEWHERE] if self._goes_on_elsewhere else []),
             *case.remarks(),
         ]
         return [self.symbols(remark) for remark in found]

@@ -1,0 +1,131 @@
+"""That references are shown where they hold alone, and numbers that develop say so."""
+
+import math
+
+import numpy as np
+import pytest
+from alsph.analysis.measures import Measure
+from alsph.cases import (
+    Cavity,
+    ConcentricRelease,
+    DamBreak,
+    EllipticalDrop,
+    FloatingBox,
+    Nozzle,
+    OscillatingCylinder,
+    Poiseuille,
+    RotatingPatch,
+    SettlingSphere,
+    Sloshing,
+    StandingWave,
+)
+from alsph.cases.remarks import keywords
+from alsph.errors import ConfigError
+from alsph.results.outcome import thinned
+
+
+def about(case, word):
+    return [remark for remark in case.remarks() if remark.startswith(f"{word}:")]
+
+
+@pytest.mark.parametrize(
+    ("case", "beyond"),
+    [
+        (ConcentricRelease, {"reynolds": 10}),
+        (DamBreak, {"reynolds": 10}),
+        (EllipticalDrop, {"reynolds": 10}),
+        (RotatingPatch, {"reynolds": 20}),
+        (SettlingSphere, {"width": 3}),
+        (StandingWave, {"reynolds": 10}),
+    ],
+)
+def test_a_reference_holds_where_its_theory_does(case, beyond):
+    assert not about(case(), "no reference")
+    (remark,) = about(case(**beyond), "no reference")
+    assert "holds" in remark or "from Re = 50 on" in remark
+    told = case(**beyond).compared([Measure("a", 1.0, 2.0, 0.1, "theory"), Measure("error", 1.0, 0.0, 0.1, "theory")])
+    assert [(measure.name, measure.source) for measure in told] == [("a", "")] and math.isnan(told[0].reference)
+
+
+def test_a_viscous_drop_is_beside_nothing(tmp_path):
+    run = EllipticalDrop(resolution=8, reynolds=10).run(tmp_path / "run", until=0.05, progress=False)
+    drop = [measure for measure in run.measures if "over exact" in measure.name]
+    assert len(drop) == 3 and all(math.isnan(measure.reference) for measure in drop)
+    assert any(measure.reference == 0 for measure in run.measures)  # the energy that a step makes stays an error
+    assert "no reference" in keywords(run.remarks)
+
+
+def test_a_flow_that_goes_on_with_another_is_not_beside_a_start(tmp_path):
+    case = Poiseuille(resolution=8)
+    first = case.run(tmp_path / "first", until=0.2, progress=False)
+    then = case.run(tmp_path / "then", until=0.2, initial_run=str(first.path), progress=False)
+    assert first.measures and not then.measures
+    assert first.profiles[0].reference[0].size and not then.profiles[0].reference[0].size
+    assert "no reference" in keywords(then.remarks) and "no reference" not in keywords(first.remarks)
+
+
+def test_what_a_steady_flow_is_judged_by_says_that_it_develops(tmp_path):
+    run = Cavity(resolution=12).run(tmp_path / "run", until=2.0, output_interval=0.1, progress=False)
+    assert all(measure.value.developing for measure in run.measures)
+    assert "still developing" in str(run.summary()[run.measures[0].name])
+
+
+@pytest.mark.parametrize(
+    ("now", "before", "reference", "tolerance", "develops"),
+    [
+        (4.87, 4.69, math.nan, 0.03, True),
+        (4.87, 4.82, math.nan, 0.03, False),
+        (-0.2, -0.2005, -0.21, 0.01, False),
+        (-0.2, -0.204, -0.21, 0.01, True),
+        (1.0, 1.006, math.nan, math.nan, True),
+        (0.012, 0.03, 0.0, 0.02, True),
+        (0.012, 0.02, 0.0, 0.02, False),
+        (1.0, math.nan, 1.0, 0.02, False),
+    ],
+)
+def test_a_measure_develops_if_it_has_changed_by_half_its_tolerance(now, before, reference, tolerance, develops):
+    measure = Measure("a", now, reference, tolerance)
+    settling = measure.settling(Measure("a", before, reference, tolerance))
+    assert getattr(settling.value, "developing", False) is develops
+    assert settling.value == now and settling.passed is measure.passed
+
+
+def test_a_floating_box_says_what_it_takes():
+    assert not any(about(FloatingBox(resolution=20), word) for word in ("rounded", "coarse", "unstable"))
+    box = FloatingBox(resolution=20, density_ratio=0.3, box_length=0.4, lift=0.02)
+    (rounded,) = about(box, "rounded")
+    assert "density_ratio 0.25 for 0.3" in rounded and "lift 0 for 0.02" in rounded
+    assert "draught of 2 Δx and a lift of 1 Δx" in about(box.replace(lift=-0.05), "coarse")[0]
+    assert not about(box.replace(resolution=40, density_ratio=0.25, lift=-0.05), "coarse")
+    square = FloatingBox(resolution=20, box_length=0.4, box_height=0.4)  # upright below 0.21 and above 0.79 alone
+    assert about(square, "unstable") and not about(square.replace(density_ratio=0.125), "unstable")
+
+
+def test_linear_theory_is_of_small_waves():
+    time = np.linspace(0, 40, 401)
+    assert Sloshing(length=2, amplitude=0.001, frequency=0.5)._theory(time)[1] == "linear theory"
+    resonant = Sloshing(length=2, amplitude=0.005, frequency=1.2)
+    assert np.abs(resonant.linear_level(time, resonant.gauge)).max() > 0.1
+    assert resonant._theory(time)[1] == "theory of an irrotational wave"
+
+
+def test_pressure_that_is_slow_beside_the_period_is_remarked_upon():
+    assert not about(OscillatingCylinder(), "slow pressure")
+    slow = OscillatingCylinder(keulegan_carpenter=0.5)
+    assert about(slow, "slow pressure") and not about(slow.replace(courant=0.05), "slow pressure")
+    assert not about(slow.replace(scheme="isph"), "slow pressure")
+
+
+def test_the_period_of_parallel_flow_is_a_whole_number_of_spacings():
+    case = Poiseuille(resolution=11)
+    assert case.domain().upper[0] == pytest.approx(6 / 11)
+    assert case.fluid_volume() == pytest.approx(6 / 11)
+    with pytest.raises(ConfigError, match="use 1.90909 or 2.09091"):
+        Nozzle(resolution=11, transition=1, upstream=1, downstream=3)
+
+
+def test_fluid_that_is_mostly_surface_is_remarked_upon():
+    history = {"surface": np.array([40.0, 40, 300]), "fluid": np.array([500.0, 500, 500])}
+    assert "60 % of the fluid" in thinned(history)[0]
+    assert not thinned({name: values[:2] for name, values in history.items()})
+    assert not thinned({"surface": np.zeros(3), "fluid": np.full(3, 500.0)}) and not thinned({})
