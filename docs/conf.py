@@ -108,6 +108,12 @@ def _bars(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[st
     lines[:] = [PIPE.sub(lambda found: found[0] if found[0] != "|" else r"\|", line) for line in lines]
 
 
+def _no_types(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Keep what stands before a colon in the first line below an attribute from being taken for its type."""
+    if what in ("attribute", "data"):
+        lines.insert(0, "")
+
+
 def _by_name(app: Any, what: str, name: str, obj: Any, options: Any, *signature: Any) -> tuple[str, None] | None:
     """Parameters are given by name; which there are stands below, not in the signature of pydantic."""
     return ("(**parameters)", None) if what == "class" and issubclass(obj, Parameters) else None
@@ -128,3 +134,4 @@ def setup(app: Any) -> None:
     app.connect("source-read", _links_to_files_above)
     app.connect("autodoc-process-docstring", _own_parameters, priority=300)  # both before napoleon
     app.connect("autodoc-process-docstring", _bars, priority=400)
+    app.connect("autodoc-process-docstring", _no_types, priority=400)

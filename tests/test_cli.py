@@ -34,7 +34,7 @@ def test_end_to_end(alsph, tmp_path, small_options):
     code, stdout, _ = alsph("animate", run, "--field", "pressure", "--fps", 5)
     assert (code, stdout) == (0, f"{run / 'figures' / 'pressure.gif'}\n")
     code, _, stderr = alsph("animate", run, "--start", 0.15)
-    assert code == 2 and "a film needs two snapshots or more, and there are 1" in stderr
+    assert code == 2 and "a film needs two snapshots or more, and there are 1 between start and end" in stderr
 
     (tmp_path / "bad").mkdir()
     (tmp_path / "bad" / "run.json").write_text("{")

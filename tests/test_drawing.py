@@ -87,7 +87,7 @@ def test_the_same_outline_in_every_form(tmp_path, name, content):
     expected = as_drawn(shapely.Polygon(L_SHAPE))
     assert as_drawn(body).symmetric_difference(expected).area < 1e-5
     assert max(body.bounds[2] - body.bounds[0], body.bounds[3] - body.bounds[1]) == pytest.approx(1)
-    assert outline.file == name and "its larger extent, " in outline.remark
+    assert outline.file == name and "its larger extent is " in outline.remark
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from alsph.analysis.measures import Measure
 from alsph.cases import (
+    Body,
     Cavity,
     ConcentricRelease,
     DamBreak,
@@ -21,7 +22,10 @@ from alsph.cases import (
 )
 from alsph.cases.remarks import keywords
 from alsph.errors import ConfigError
+from alsph.geometry.outline import Outline
 from alsph.results.outcome import thinned
+from shapely import Point
+from shapely.affinity import translate
 
 
 def about(case, word):
@@ -45,6 +49,11 @@ def test_a_reference_holds_where_its_theory_does(case, beyond):
     assert "holds" in remark or "from Re = 50 on" in remark
     told = case(**beyond).compared([Measure("a", 1.0, 2.0, 0.1, "theory"), Measure("error", 1.0, 0.0, 0.1, "theory")])
     assert [(measure.name, measure.source) for measure in told] == [("a", "")] and math.isnan(told[0].reference)
+
+
+def test_a_wave_so_steep_that_its_start_is_packed_says_so():
+    assert "not to be trusted" in about(StandingWave(amplitude=0.2), "steep")[0]
+    assert "not to be trusted" not in about(StandingWave(amplitude=0.1), "steep")[0]
 
 
 def test_a_viscous_drop_is_beside_nothing(tmp_path):
@@ -122,6 +131,15 @@ def test_the_period_of_parallel_flow_is_a_whole_number_of_spacings():
     assert case.fluid_volume() == pytest.approx(6 / 11)
     with pytest.raises(ConfigError, match="use 1.90909 or 2.09091"):
         Nozzle(resolution=11, transition=1, upstream=1, downstream=3)
+
+
+def test_the_inlet_is_as_near_as_the_foremost_body():
+    disc = Point(0, 0).buffer(0.5)
+    pair = Body(shape=Outline.of([translate(disc, -2.75), translate(disc, 2.75)]), upstream=4.0)
+    (remark,) = about(pair, "short channel")
+    assert "inlet 1.25 D before the body, which slows the stream there by about 16 %" in remark
+    assert not about(pair.replace(upstream=6.75), "short channel")
+    assert about(Body(shape=Outline.of(disc), upstream=1.25), "short channel") == [remark]
 
 
 def test_fluid_that_is_mostly_surface_is_remarked_upon():

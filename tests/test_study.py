@@ -14,15 +14,16 @@ import h5py
 import numpy as np
 import pytest
 import tomli_w
-from alsph import study
+from alsph import Run, study
 from alsph.cases import Couette, Cylinder, TaylorGreen
 from alsph.errors import ConfigError, WalltimeError
 from alsph.study import Figure, Study, Sweep
 from alsph.study.board import Board
 from alsph.study.execution import _jobs
-from alsph.study.results import names
+from alsph.study.results import _time_of_largest_lift, names
 from alsph.study.state import RUNS, State, state
 from rich.console import Console
+from synthetic import write_run
 
 DECAY = "decay rate of the kinetic energy, U/D"
 VORTEX = {"case": "taylor_green", "resolution": 16, "run": {"until": 0.2, "output_interval": 0.1}}
@@ -481,6 +482,30 @@ def test_the_results_of_a_run_are_known_beforehand(tmp_path, case):
 def test_the_studies_that_come_with_alsph_ask_for_what_there_is(name):
     declared = study.load(name)
     study.check_names(declared, declared.points())
+
+
+def test_a_study_of_a_case_with_units_tabulates_si():
+    units = {"length": 0.01, "velocity": 0.02, "density": 1000.0, "kinematic_viscosity": 1e-6}
+    asked = {"sweep": Sweep(product={"resolution": [8, 10]}), "collect": ["mean drag, N/m"]}
+    plain = declare(base={"case": "cylinder"}, **asked)
+    with pytest.raises(ConfigError, match="no result 'mean drag, N/m'"):
+        study.check_names(plain, plain.points())
+    declared = declare(base={"case": "cylinder", "units": units}, **asked)
+    study.check_names(declared, declared.points())
+
+
+def test_fields_are_drawn_in_the_window(tmp_path):
+    run = Run(write_run(tmp_path / "run", Cylinder(resolution=8), end=40.0))
+    inside = run.times[(run.times >= run.window.start) & (run.times <= run.window.end)]
+    assert _time_of_largest_lift(run) in inside
+
+
+def test_what_is_wrong_with_a_figure_names_its_table(tmp_path):
+    file = tmp_path / "study.toml"
+    good = '[[figure]]\nname = "a"\nx = "reynolds"\ny = ["Strouhal number"]\n'
+    file.write_text(f'name = "s"\n[base]\ncase = "cylinder"\n[sweep.product]\nreynolds = [100]\n{good}{good}yy = 1\n')
+    with pytest.raises(ConfigError, match=r"\[\[figure\]\] 2: yy: unknown parameter"):
+        study.load(file)
 
 
 def test_how_runs_were_averaged_can_be_tabulated_and_not_drawn():

@@ -102,6 +102,11 @@ def test_a_case_that_hides_its_length_is_told():
         Hidden(units=WATER)
 
 
+def test_mistakes_beyond_three_are_counted_as_they_are():
+    with pytest.raises(ConfigError, match="units.density: is missing; and 1 more$"):
+        Cylinder(units={"length": 0.01, "velocity": 0.02, "rho": 998, "nu": 1e-6})
+
+
 def test_changes_of_a_case_with_units():
     case = Cylinder(units=WATER, **SMALL)
     faster = case.replace(units=WATER | {"velocity": 0.02})

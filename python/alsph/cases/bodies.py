@@ -154,6 +154,24 @@ class Bodies(Channel):
         sides = [LineString([(0, bottom), (0, top)]) for _, bottom, _, top in shapely.bounds(self.outlines)]
         return float(shapely.union_all(sides).length)
 
+    @property
+    def ahead(self) -> float:
+        """Distance from the inlet to the centre of what slows the stream there: one of the bodies, or all [D]."""
+        return self._slowing[1]
+
+    @property
+    def slowed(self) -> float:
+        """Share by which the bodies slow the stream at the inlet, one of them or all, as cylinders would [-]."""
+        return self._slowing[0]
+
+    @property
+    def _slowing(self) -> tuple[float, float]:
+        whole = (super().slowed, self.upstream)
+        left, bottom, right, top = shapely.bounds(self.outlines).T
+        ahead = self.upstream + (left + right) / 2
+        each = (0.5 * (top - bottom) / ahead) ** 2
+        return max([whole, *zip(each.tolist(), ahead.tolist(), strict=True)] if len(each) > 1 else [whole])
+
     def scales(self) -> dict[str, float]:
         """Return those of the flow and the thickness of the body's thinnest part."""
         thinnest = remarks.thinnest(self.outline) / self.particle_spacing

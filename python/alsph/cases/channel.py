@@ -138,7 +138,12 @@ class Channel(Case):
         behind = self.length - self.upstream - self.bounds[2]
         # Who asks for sides that hold the fluid wants them near.
         near = (0.0, 0.0) if self.is_confined else (self.blockage, self.slowed)
-        return [*super().remarks(), *remarks.channel(self.blocked, self.upstream, behind, *near)]
+        return [*super().remarks(), *remarks.channel(self.blocked, self.ahead, behind, *near)]
+
+    @property
+    def ahead(self) -> float:
+        """Distance from the inlet to the centre of what slows the stream there [D]."""
+        return self.upstream
 
     @property
     def blocked(self) -> float:

@@ -64,7 +64,9 @@ def _units(given: Any) -> Units:
     try:
         return Units.of(given)
     except ConfigError as error:
-        prefixed = (mistake if mistake.startswith("units:") else f"units.{mistake}" for mistake in error.mistakes)
+        prefixed = (
+            mistake if mistake.startswith(("units:", "and ")) else f"units.{mistake}" for mistake in error.mistakes
+        )
         raise ConfigError(*prefixed) from None
     except ValueError as error:
         raise ConfigError(f"units: {error}") from None

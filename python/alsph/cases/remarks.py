@@ -263,11 +263,11 @@ def thin(name: str, shape: Polygon, left: Polygon | MultiPolygon, spacing: float
     if length > spacing or pieces > 1:
         text = f"cut off, for they are thinner than 2 Δx: up to {length:.2g} D of tips, {100 * area:.2g} % of the area"
         if pieces > 1:
-            text += f", so that the {name} is in {pieces} pieces, with flow between them"
+            text += f", so that {_the(name)} is in {pieces} pieces, with flow between them"
         found.append(f"thin parts: {text}; they come back with resolution")
     if thick < 0.99 * THICK * spacing:
         known = "lift and drag were found off by 17 to 23 % below 3 Δx, by 4 % at 5 Δx"
-        text = f"the {name} is {thick / spacing:.2g} Δx at its thickest"
+        text = f"{_the(name)} is {thick / spacing:.2g} Δx at its thickest"
         found.append(f"thin body: {text}; {known}; resolution = {math.ceil(THICK / thick)} makes it {THICK:g} Δx")
     return found
 
@@ -276,17 +276,22 @@ def thin_in_space(name: str, body: Volume, spacing: float) -> list[str]:
     """Remark on a body in space too thin for the resolution, or with parts that are (Δx in D)."""
     share, thick = body.left(THINNEST * spacing), body.thickness / spacing
     if share < LEAST_LEFT:
-        text = f"the {name} is at most {thick:.3g} Δx thick, only {100 * share:.0f} % of it {THINNEST:g} Δx and more"
+        text = f"{_the(name)} is at most {thick:.3g} Δx thick, only {100 * share:.0f} % of it {THINNEST:g} Δx and more"
         return [f"{TOO_THIN}: {text}; use a finer resolution"]
     found = []
     if share < MOST_LEFT:
-        text = f"{100 * (1 - share):.2g} % of the {name} is thinner than {THINNEST:g} Δx"
+        text = f"{100 * (1 - share):.2g} % of {_the(name)} is thinner than {THINNEST:g} Δx"
         found.append(f"thin parts: {text}; each face there has half a wall, and loads are uncertain")
     if thick < 0.95 * THICK:  # it is known to some per cent
         enough = math.ceil(THICK / (thick * spacing))
-        text = f"the {name} is {thick:.2g} Δx at its thickest"
+        text = f"{_the(name)} is {thick:.2g} Δx at its thickest"
         found.append(f"thin body: {text}; resolution = {enough} makes it {THICK:g} Δx")
     return found
+
+
+def _the(name: str) -> str:
+    """Return a body's name as a sentence has it: one of several stands by itself."""
+    return name if "_" in name else f"the {name}"
 
 
 def _coarsest(shape: Polygon, thick: float) -> int:

@@ -70,7 +70,8 @@ def read(path: Path) -> tuple[list[shapely.Polygon], str]:
     if not np.isfinite(points).all() or not extent > 0:
         raise ConfigError(f"{name}: its coordinates are no lengths")
     bodies = _closed([(curve - lower) / extent for curve in curves], lambda at: at * extent + lower, name)
-    size = f"its larger extent, {extent:.6g}, is D"
+    unit = "pixels of 1/96 inch" if path.suffix.lower() == ".svg" else "units of the file"
+    size = f"its larger extent is {extent:.6g} {unit}, and D, or as many D as `scale` says"
     return bodies, "; ".join([size, *left_out])
 
 

@@ -85,7 +85,11 @@ def animate(
     pictures.field_style(name)
     times = [time for time in run.times if start <= time <= end][:: int(every)]
     if len(times) < 2:
-        raise ConfigError(f"a film needs two snapshots or more, and there are {len(times)}; lower output_interval")
+        told = f"a film needs two snapshots or more, and there are {len(times)}"
+        if len(run.times[:: int(every)]) < 2:
+            raise ConfigError(f"{told}; lower output_interval")
+        span = f"the run's lie at tU/D = {run.times[0]:.4g} to {run.times[-1]:.4g}"
+        raise ConfigError(f"{told} between start and end; {span}, {len(run.times)} of them")
     view = view or _extent(run, times, plane)
     view = pictures.extent_of(run.snapshot(times[0]), run.spacing, view, plane)
     if limit is None:

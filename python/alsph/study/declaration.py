@@ -306,10 +306,18 @@ def _parsed(tables: dict[str, Any], preset: str | None) -> Study:
         raise ConfigError(f"unknown preset '{preset}'; {known}")
     if presets:
         tables = _merged(tables, presets[preset or next(iter(presets))])
-    tables["figures"] = [Figure(**table) for table in tables.pop("figure", [])]
+    tables["figures"] = [_figure(number, table) for number, table in enumerate(tables.pop("figure", []), 1)]
     tables["published"] = [Published(**table) for table in tables.pop("published", [])]
     tables["sweep"] = Sweep(**tables.get("sweep", {}))
     return Study(**tables)
+
+
+def _figure(number: int, table: dict[str, Any]) -> Figure:
+    """Return a figure of a file; what is wrong with it names its table."""
+    try:
+        return Figure(**table)
+    except ConfigError as error:
+        raise ConfigError(*(f"[[figure]] {number}: {mistake}" for mistake in error.mistakes)) from None
 
 
 def _check_shape(tables: Mapping[str, Any]) -> None:

@@ -78,8 +78,14 @@ def names(config: Config) -> tuple[set[str], set[str]]:
         run = Run(folder.path)
         run.config = config
         measures, profiles = {measure.name for measure in run.measures}, {profile.name for profile in run.profiles}
+        measures |= _in_si(run).keys()
     later = set(config.case.later_names)
     return measures | later, profiles | later
+
+
+def _in_si(run: Run) -> dict[str, Estimate]:
+    """Return the results that have a dimension in SI; none of a case without units."""
+    return run.dimensional() if run.units else {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,9 +324,10 @@ SNAPSHOTS_AT_LIFT = 10
 
 
 def _time_of_largest_lift(run: Run) -> float | None:
-    """Return the time of that of the last snapshots at which the lift is largest; None without lift."""
+    """Return the time of that of the last snapshots in the window at which the lift is largest; None without lift."""
     lift = run.coefficient("y")
-    times = run.times[-SNAPSHOTS_AT_LIFT:]
+    settled = run.times[(run.times >= run.window.start) & (run.times <= run.window.end)]
+    times = (settled if len(settled) else run.times)[-SNAPSHOTS_AT_LIFT:]
     if not len(times) or not np.isfinite(lift).any():
         return None
     at = np.interp(times, run.history["time"], lift)
@@ -333,7 +340,7 @@ def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, fl
         return {}, {}, {}
     try:
         run = Run(folder)
-        results: dict[str, Any] = {measure.name: measure.value for measure in run.measures}
+        results: dict[str, Any] = {measure.name: measure.value for measure in run.measures} | _in_si(run)
         known = {measure.name: measure.reference for measure in run.measures if abs(measure.reference) > 0}
         history = run.history
         numbers = (
