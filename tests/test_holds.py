@@ -21,9 +21,12 @@ from alsph.cases import (
     StandingWave,
 )
 from alsph.cases.remarks import keywords
+from alsph.config import Config
 from alsph.errors import ConfigError
 from alsph.geometry.outline import Outline
 from alsph.results.outcome import thinned
+from alsph.run_settings import RunSettings
+from alsph.running.describe import describe
 from shapely import Point
 from shapely.affinity import translate
 
@@ -140,6 +143,19 @@ def test_the_inlet_is_as_near_as_the_foremost_body():
     assert "inlet 1.25 D before the body, which slows the stream there by about 16 %" in remark
     assert not about(pair.replace(upstream=6.75), "short channel")
     assert about(Body(shape=Outline.of(disc), upstream=1.25), "short channel") == [remark]
+
+
+def test_several_bodies_are_told_and_drawn_by_their_names():
+    disc = Point(0, 0).buffer(0.5)
+    case = Body(shape=Outline.of([disc, translate(disc, 2, 1)]), resolution=10)
+    assert {name: at.tolist() for name, at in case.middles().items()} == {
+        "body_1": pytest.approx([3.0, -0.5]),
+        "body_2": pytest.approx([5.0, 0.5]),
+    }
+    told = dict(describe(Config(case, RunSettings()), probe=False))
+    assert told["body_2"] == "1 D by 1 D about x = 5 D, y = 0.5 D"
+    assert {"body_1", "body_2"} <= {text.get_text() for text in case.draw().axes[1].texts}
+    assert not Body().middles()
 
 
 def test_fluid_that_is_mostly_surface_is_remarked_upon():

@@ -221,10 +221,12 @@ def test_an_open_curve_is_closed_and_it_is_told(tmp_path):
 
 
 def test_a_body_in_other_units_is_told_of_scale(tmp_path):
-    with pytest.raises(ConfigError, match="100 D long and 40 D high, comes 46 D beyond a side.*by `scale` what"):
+    with pytest.raises(ConfigError, match="100 D long and 40 D high, comes 46 D beyond the inlet.*by `scale` what"):
         Body(shape=read(tmp_path, "0 0\n100 0\n100 40\n0 40\n"))
     assert Body(shape=read(tmp_path, "0 0\n100 0\n100 40\n0 40\n"), scale=0.01).size == 1.0
-    with pytest.raises(ConfigError, match="within 0.25 D of a side of the channel; leave at least 0.5 D$"):
+    with pytest.raises(
+        ConfigError, match="within 0.25 D of the inlet of the channel; leave at least 0.5 D by a larger upstream$"
+    ):
         Body(shape=shapely.box(0, 0, 3, 1), scale=1.0, upstream=1.75)
 
 

@@ -56,13 +56,20 @@ class Bodies(Channel):
         left, bottom, right, top = self.outline.bounds
         _, lifted = self.centre
         below, above = self.height / 2 + lifted, self.height / 2 - lifted
-        room = min(self.upstream + left, self.length - self.upstream - right, bottom + below, above - top)
-        if room < 0.5:
+        rooms = {
+            ("inlet", "upstream"): self.upstream + left,
+            ("outlet", "length"): self.length - self.upstream - right,
+            ("lower side", "height"): bottom + below,
+            ("upper side", "height"): above - top,
+        }
+        (side, parameter), room = min(rooms.items(), key=lambda item: item[1])
+        if room < 0.5 - 1e-9:
             one = len(self.outlines) == 1
             what, come = ("the body", "comes") if one else ("the bodies together", "come")
-            where = f"within {room:.3g} D of a side" if room >= 0 else f"{-room:.3g} D beyond a side"
+            where = f"within {room:.4g} D of" if room >= 0 else f"{-room:.4g} D beyond"
             size = f"{right - left:.3g} D long and {top - bottom:.3g} D high"
-            raise ValueError(f"{what}, {size}, {come} {where} of the channel; leave at least 0.5 D{self._hint}")
+            remedy = f"leave at least 0.5 D by a larger {parameter}{self._hint}"
+            raise ValueError(f"{what}, {size}, {come} {where} the {side} of the channel; {remedy}")
         return self
 
     @property
@@ -91,6 +98,14 @@ class Bodies(Channel):
         """``body``, or ``body_1``, ``body_2``, ... where there are several."""
         count = len(self.outlines)
         return ["body"] if count == 1 else [f"body_{number}" for number in range(1, count + 1)]
+
+    def middles(self) -> dict[str, FloatArray]:
+        """Return the middle (2,) of each body by its name, where there are several [D]."""
+        if len(self.outlines) == 1:
+            return {}
+        left, bottom, right, top = shapely.bounds(self.outlines).T
+        middles = np.stack([left + right, bottom + top], axis=1) / 2 + self.centre
+        return dict(zip(self.coefficient_bodies, middles, strict=True))
 
     @cached_property
     def _refusal(self) -> str:

@@ -58,6 +58,12 @@ NEAR = 8.0
 CHANGED = 1e-3
 """Share of a body's area that must be cut off or filled for its outline as it was given to be drawn, too."""
 
+NAMES = {Kind.SOLID: "solid, its normal in white"}
+"""What kinds are called that are not by their name alone."""
+
+LABEL = {"facecolor": "w", "alpha": 0.8, "edgecolor": "none", "pad": 1}
+"""Box behind a word in the picture."""
+
 View = tuple[float, float, float, float]
 """Left, right, bottom and top [D]."""
 
@@ -80,6 +86,8 @@ class Setup:
         What the bodies extend over [D].
     thinnest : tuple of ndarray and str, optional
         Where what is carried of the thinnest part of the bodies ends (2,) [D], and what it is called.
+    names : dict of ndarray, shape (2,)
+        Middles of bodies by their names, where there are several [D].
     points : ndarray, shape (m, d)
         Points that are recorded [D].
     plane : (int, int)
@@ -95,6 +103,7 @@ class Setup:
     surface: list[FloatArray] = field(default_factory=list)
     bodies: View | None = None
     thinnest: tuple[FloatArray, str] | None = None
+    names: dict[str, FloatArray] = field(default_factory=dict)
     points: FloatArray | None = None
     plane: tuple[int, int] = (0, 1)
 
@@ -164,6 +173,7 @@ def _found(case: Case, state: Arrays, points: FloatArray | None, plane: tuple[in
         surface=_surface(case, view, plane) if view else [],
         bodies=view,
         thinnest=_thinnest(case) if isinstance(case, Bodies) else None,
+        names=case.middles() if isinstance(case, Bodies) else {},
         points=points,
         plane=plane,
     )
@@ -290,6 +300,8 @@ def _draw(axes: Axes, found: Setup, view: View, *, close: bool) -> None:
             axes.plot(*curve.T, color=colour, ls=dashes, lw=1.2 if close else 0.6)
     if found.points is not None and len(found.points):
         axes.plot(*found.points[:, across].T, "+", color=PALETTE[3], ms=6)
+    for name, at in found.names.items() if close else ():
+        axes.annotate(name, (at[0], at[1]), ha="center", va="center", fontsize="small", clip_on=True, bbox=LABEL)
     if close and found.thinnest:
         axes.plot(*found.thinnest[0], "o", mfc="none", color=PALETTE[1], ms=9)
     if not close:
@@ -304,8 +316,7 @@ def _name_sides(axes: Axes, found: Setup) -> None:
     low, high = (np.array(corner)[list(found.plane)] for corner in (found.domain.lower, found.domain.upper))
     axes.plot(*np.array([low, [high[0], low[1]], high, [low[0], high[1]], low]).T, "k-", lw=0.6)
     middle = (low + high) / 2
-    box = {"facecolor": "w", "alpha": 0.8, "edgecolor": "none", "pad": 1}
-    look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": "x-small", "bbox": box}
+    look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": "x-small", "bbox": LABEL}
     look["textcoords"] = "offset points"
     for axis, sides in enumerate(found.domain.boundaries[axis] for axis in found.plane):
         for corner, side, inwards in ((low, sides[0], 1), (high, sides[1], -1)):
@@ -322,7 +333,7 @@ def _explain(figure: Figure, found: Setup) -> None:
 
     dot: dict[str, Any] = {"marker": "o", "ls": "", "ms": 6}
     handles = [
-        Line2D([], [], color=colour, label=kind.name.lower(), **dot)
+        Line2D([], [], color=colour, label=NAMES.get(kind, kind.name.lower()), **dot)
         for kind, colour in KINDS.items()
         if (found.kind == kind).any()
     ]

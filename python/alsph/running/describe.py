@@ -9,6 +9,8 @@ import numpy as np
 
 from alsph.arrays import Arrays
 from alsph.cases import Body, Body3D
+from alsph.cases.base import Case
+from alsph.cases.bodies import Bodies
 from alsph.config import Config
 from alsph.engine.simulation import Simulation
 from alsph.errors import SolverError
@@ -18,6 +20,9 @@ from alsph.text import duration
 from alsph.units import Units
 
 PROBE_SECONDS = 5.0
+
+MOST_BODIES = 10
+"""Bodies that are told one by one."""
 
 
 def starting(config: Config) -> Arrays:
@@ -60,6 +65,7 @@ def describe(config: Config, state: Arrays | None = None, *, probe: bool = True)
     lines = [
         ("case", f"{case.name}: {case.title}"),
         *((("outline", str(case.shape)),) if isinstance(case, Body | Body3D) else ()),
+        *_several(case),
         ("Reynolds number", f"{case.reynolds:g}"),
         ("resolution", f"D/Δx = {case.resolution}, Δx = {case.particle_spacing:.6g} D"),
         ("particles", f"{kinds.sum():,}: {counts}"),
@@ -101,6 +107,17 @@ def describe(config: Config, state: Arrays | None = None, *, probe: bool = True)
         lines.append(("warning", warning))
     lines += [("remark", remark) for remark in remarks_of(config, state)]
     return [(case.symbols(name), case.symbols(text)) for name, text in lines]
+
+
+def _several(case: Case) -> list[tuple[str, str]]:
+    """Return where each of several bodies is, and how large."""
+    if not isinstance(case, Bodies) or not (middles := case.middles()):
+        return []
+    extents = [(right - left, top - bottom) for left, bottom, right, top in (body.bounds for body in case.outlines)]
+    return [
+        (name, f"{length:.4g} D by {height:.4g} D about x = {x:.4g} D, y = {y:.4g} D")
+        for (name, (x, y)), (length, height) in zip(middles.items(), extents, strict=True)
+    ][:MOST_BODIES]
 
 
 def _in_si(units: Units, step: float, until: float) -> list[tuple[str, str]]:
