@@ -338,7 +338,7 @@ def test_what_is_off_centre_or_between_no_slip_sides_has_no_reference_of_the_cen
         ConfinedCylinder(height=5.0),
     ):
         assert case._reference() is None and "not validated" in " ".join(case.remarks())
-    assert RotatingCylinder(body_offset=1.0)._known("developed") == {} != RotatingCylinder()._known("developed")
+    assert RotatingCylinder(body_offset=1.0)._loads("developed") == {} != RotatingCylinder()._loads("developed")
     assert ConfinedCylinder()._reference().results["Strouhal number"] == pytest.approx(0.3017, abs=1e-3)
     assert ConfinedCylinder(reynolds=20)._reference().results["mean drag coefficient"] == 5.579535
     assert not ConfinedCylinder().remarks()
