@@ -257,7 +257,10 @@ def test_nozzle_measures(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({"contraction": 1.33}, "contraction = 1.33: the step on each side, .* no whole number of spacings .*; use 1.3 or 1.4$"),
+        (
+            {"contraction": 1.33},
+            "contraction = 1.33: the step on each side, .* no whole number .*use 1.3 or 1.4$",
+        ),
         ({"transition": 0.33}, "transition = 0.33: not a whole number"),
         ({"contraction": 1.0}, "contraction = 1.0: must be greater than 1"),
     ],

@@ -72,3 +72,9 @@ def test_a_measure_that_is_nan_is_told_with_its_run_and_why(tmp_path):
     (gap,) = [gap for gap in report.gaps if gap.startswith(f"D/Δx = 8, {folder}: no ")]
     assert "Strouhal number" in gap and gap.endswith(strouhal.values[0].note) and f"- {gap}" in str(report)
     assert report.gaps[0] in (report.path / "convergence.md").read_text()
+
+
+def test_an_error_is_not_extrapolated_below_zero():
+    found = grid_convergence("error", [10, 14, 20], [0.30, 0.265, 0.23], 0.0)
+    assert found.kind == "monotonic" and math.isnan(found.richardson) and math.isnan(found.order)
+    assert grid_convergence("error", [10, 20, 40], [0.4, 0.1, 0.025], 0.0).order == pytest.approx(2.0, abs=1e-6)

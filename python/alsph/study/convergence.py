@@ -48,7 +48,7 @@ class Convergence:
     order : float
         Observed order p; NaN unless monotonic.
     richardson : float
-        Value extrapolated to Δx = 0; NaN unless monotonic.
+        Value extrapolated to Δx = 0; NaN unless monotonic, and of an error that would fall below zero.
     index : float
         Grid convergence index of the finest resolution, 1.25 |e| / (r^p − 1) with the relative change e of the last
         refinement by r; half the range over the finest value where the values oscillate; NaN where they diverge, and of
@@ -116,6 +116,8 @@ def grid_convergence(
 
     order = float(brentq(mismatch, 1e-3, LARGEST_ORDER))
     richardson = f3 + fine / (r23**order - 1)
+    if reference == 0 and richardson / f3 < -0.1:  # no error is below zero: the values are not yet on their way to it
+        return Convergence(name, *known, "monotonic", *unknown, np.nan, reference)
     index = SAFETY * abs(fine) / scale / (r23**order - 1)
     return Convergence(name, *known, "monotonic", order, float(richardson), float(index), reference)
 
