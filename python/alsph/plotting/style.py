@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 TIME_LABEL = "$tU/D$"
 
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#555555")
-"""Colours of curves: those of Okabe and Ito (2008), which the colour-blind tell apart, dark grey for black and yellow."""
+"""Colours of curves: those of Okabe and Ito (2008), which the colour-blind tell apart, grey for black and yellow."""
 
 MARKERS = "osD^v<>pPX"
 """What tells curves apart in print, and to who sees no colours."""
