@@ -79,6 +79,9 @@ def test_a_flow_that_goes_on_with_another_is_not_beside_a_start(tmp_path):
 def test_what_a_steady_flow_is_judged_by_says_that_it_develops(tmp_path):
     run = Cavity(resolution=12).run(tmp_path / "run", until=2.0, output_interval=0.1, progress=False)
     assert all(measure.value.developing for measure in run.measures)
+    assert run.plot_profile("u at x = D/2").axes[0].get_title() == "u at x = D/2"
+    with pytest.raises(ConfigError, match="profile = 'u at x': unknown; did you mean 'u at x = D/2'"):
+        run.plot_profile("u at x")
     assert "still developing" in str(run.summary()[run.measures[0].name])
 
 

@@ -411,8 +411,11 @@ class Run(Loads):
             reference = next(known, None)
         return self._saved(_plotting().pressure_coefficient(coefficient, reference, names), path, body)
 
-    def plot_profile(self, profile: Profile, path: str | Path | None = None) -> Figure:
-        """Figure of one of :attr:`profiles` beside its reference; saved if `path` is given."""
+    def plot_profile(self, profile: Profile | str, path: str | Path | None = None) -> Figure:
+        """Figure of one of :attr:`profiles`, or of that of a name, beside its reference; saved if `path` is given."""
+        if isinstance(profile, str):
+            choose("profile", profile, named := {each.name: each for each in self.profiles})
+            profile = named[profile]
         return self._saved(_plotting().profile({"computed": profile}), path)
 
     def plot_gauges(self, path: str | Path | None = None) -> Figure:
