@@ -109,8 +109,8 @@ def _bars(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[st
 
 
 def _no_types(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
-    """Keep what stands before a colon in the first line below an attribute from being taken for its type."""
-    if what in ("attribute", "data"):
+    """Keep what stands before a colon in the first line of an attribute from being taken for its type."""
+    if what in ("attribute", "data", "property"):
         lines.insert(0, "")
 
 
