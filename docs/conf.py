@@ -108,10 +108,17 @@ def _bars(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[st
     lines[:] = [PIPE.sub(lambda found: found[0] if found[0] != "|" else r"\|", line) for line in lines]
 
 
-def _no_types(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
-    """Keep what stands before a colon in the first line of an attribute from being taken for its type."""
+ATTRIBUTES: dict[str, list[str]] = {}
+"""What stands below attributes, by their names, while napoleon takes what stands before its first colon for a type."""
+
+
+def _keep(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
     if what in ("attribute", "data", "property"):
-        lines.insert(0, "")
+        ATTRIBUTES[name] = list(lines)
+
+
+def _restore(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    lines[:] = ATTRIBUTES.pop(name, lines)
 
 
 def _by_name(app: Any, what: str, name: str, obj: Any, options: Any, *signature: Any) -> tuple[str, None] | None:
@@ -134,4 +141,5 @@ def setup(app: Any) -> None:
     app.connect("source-read", _links_to_files_above)
     app.connect("autodoc-process-docstring", _own_parameters, priority=300)  # both before napoleon
     app.connect("autodoc-process-docstring", _bars, priority=400)
-    app.connect("autodoc-process-docstring", _no_types, priority=400)
+    app.connect("autodoc-process-docstring", _keep, priority=450)
+    app.connect("autodoc-process-docstring", _restore, priority=600)  # after it
