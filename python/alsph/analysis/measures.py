@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -61,6 +62,11 @@ class Measure:
     def passed(self) -> bool:
         """Whether the error is within the tolerance; a NaN is not."""
         return abs(self.error) <= self.tolerance
+
+
+def alone(measures: Iterable[Measure]) -> list[Measure]:
+    """Return measures without their references, and no error norms."""
+    return [own for measure in measures if (own := measure.alone())]
 
 
 class Measures(list[Measure]):

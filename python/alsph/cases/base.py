@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from alsph.analysis.measures import Measure, Profile
+from alsph.analysis.measures import Measure, Profile, alone
 from alsph.analysis.record import Record
 from alsph.arrays import Arrays, FloatArray
 from alsph.cases import remarks
@@ -70,6 +70,8 @@ class Case(Discretised):
     """Whether the flow may become steady or periodic; if not, averages are of the whole run, without ±."""
     is_steady: ClassVar[bool] = False
     """Whether measures are of the steady flow late in a run; they are said to develop where they change until then."""
+    inviscid_from: ClassVar[float] = 0.0
+    """Reynolds number from which on references hold that are of a fluid without viscosity."""
     from_start: ClassVar[bool] = False
     """Whether references are of the flow from its own start on, not of one that goes on with another run's."""
     picture_axis: ClassVar[str] = "z"
@@ -238,11 +240,13 @@ class Case(Discretised):
     @property
     def no_reference(self) -> str:
         """Why references do not hold for these parameters, in words; empty where they do."""
-        return ""
+        if self.reynolds >= self.inviscid_from:
+            return ""
+        return f"it is of a fluid without viscosity, and holds from Re = {self.inviscid_from:g} on"
 
     def compared(self, measures: list[Measure]) -> list[Measure]:
         """Return measures as they are, or without their reference where it does not hold (:attr:`no_reference`)."""
-        return [alone for measure in measures if (alone := measure.alone())] if self.no_reference else measures
+        return alone(measures) if self.no_reference else measures
 
     def measures(self, run: Record) -> list[Measure]:
         """Return what a run of this case is judged by."""

@@ -23,8 +23,6 @@ RADIUS = 0.5
 
 COURANT = 0.02
 """Courant number where none is given: pressure that travels as waves is to cross the vessel often in 0.1 √(D/g)."""
-INVISCID = 3000.0
-"""Reynolds number from which on viscosity does not matter to the acceleration within its tolerance."""
 SOURCE = "exact, of a fluid without viscosity: (m - ρA) g / (m + C_a ρA), C_a = (b² + a²)/(b² - a²)"
 
 
@@ -39,6 +37,7 @@ class ConcentricRelease(Case):
     name: ClassVar[str] = "concentric_release"
     title: ClassVar[str] = "release of a cylinder in a round vessel"
     settles: ClassVar[bool] = False
+    inviscid_from: ClassVar[float] = 3000.0
     symbols: ClassVar[Symbols] = Symbols("D", "√(gD)", "√(D/g)", "√(g/D)", "g", "ρgD", "t√(g/D)")
 
     reynolds: float = Field(default=1e4, gt=0, description="Reynolds number UD/ν [-]")
@@ -114,13 +113,6 @@ class ConcentricRelease(Case):
     def acceleration(self) -> float:
         """That of the cylinder at the start, in a fluid without viscosity, upwards [g]."""
         return (1 - self.density_ratio) / (self.density_ratio + self.added_mass_coefficient)
-
-    @property
-    def no_reference(self) -> str:
-        """Say that the fluid is too viscous."""
-        if self.reynolds >= INVISCID:
-            return ""
-        return f"it is of a fluid without viscosity, and holds from Re = {INVISCID:g} on"
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the mean acceleration over the first tenth of √(D/g), in which the cylinder moves but little."""

@@ -171,8 +171,6 @@ class FreeSurface(Case):
     """Whether the body force (0, −1), in 3-D (0, 0, −1), acts."""
     tension: ClassVar[bool] = False
     """Whether the pressure may fall below that of the air, as in a fluid that turns."""
-    inviscid_from: ClassVar[float] = 0.0
-    """Reynolds number from which on references hold that are of a fluid without viscosity."""
     splashes: ClassVar[bool] = False
     """Whether impacts press particles together, which `packing_relaxation` takes apart."""
 
@@ -304,13 +302,6 @@ class FreeSurface(Case):
             velocity = (GRAVITY * self.units.length) ** 0.5
             found.append(f"{told}; on earth units_velocity is √(gH) = {velocity:.4g}")
         return found
-
-    @property
-    def no_reference(self) -> str:
-        """Say that the fluid is too viscous for references that are of one without viscosity."""
-        if self.reynolds >= self.inviscid_from:
-            return ""
-        return f"it is of a fluid without viscosity, and holds from Re = {self.inviscid_from:g} on"
 
     def measures(self, run: Record) -> list[Measure]:
         """Return what energy was made."""

@@ -18,7 +18,7 @@ from alsph.analysis.probes import GaugeRecord
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.free_surface import Gauges
-from alsph.cases.source import reason, shown_name
+from alsph.cases.source import shown_name
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
 from alsph.folder.durable import check_folder
@@ -28,6 +28,7 @@ from alsph.geometry.plane import Plane
 from alsph.parameters import choose
 from alsph.results.dimensional import dimensional
 from alsph.results.export import Grid
+from alsph.results.judged import ELSEWHERE, goes_on_elsewhere, judged
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.loads import Loads
 from alsph.results.outcome import made, outcome, unsolved
@@ -41,23 +42,6 @@ if TYPE_CHECKING:
 
 STREAMLINE_CELLS = 300
 """Along the longer side of a picture, at most."""
-
-ELSEWHERE = "no reference: it is of the flow from the case's own start on, and this run goes on with another's"
-"""The remark on a run that an initial run takes its reference."""
-
-
-class _Until:
-    """What a run was when a share of its time had gone, as far as its snapshots tell; the rest is the run's."""
-
-    def __init__(self, run: Run, share: float) -> None:
-        self._run = run
-        self.times = run.times[run.times <= share * run.times[-1:]]
-
-    def snapshot(self, time: float | None = None) -> Snapshot:
-        return self._run.snapshot(self.times[-1] if time is None else time)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._run, name)
 
 
 class Run(Loads):
@@ -115,30 +99,7 @@ class Run(Loads):
     @cached_property
     def _judged(self) -> tuple[list[Measure], list[str]]:
         """The measures, and what went wrong with them in code of the user's."""
-        case = self.config.case
-        try:
-            found = case.measures(self)
-            if odd := [measure for measure in found if not isinstance(measure, Measure)]:
-                raise TypeError(f"{shown(odd[0])} is no Measure")
-        except Exception as error:
-            if type(case).__module__.startswith("alsph."):
-                raise
-            what = reason(error, case.code.file if case.code else "<cell>")
-            return [], [f"no measures: those of {type(case).__name__} fail, {what}; correct the file that defines it"]
-        if case.is_driven or self._goes_on_elsewhere:
-            return [alone for measure in found if (alone := measure.alone())], []
-        return self._settled(found) if case.is_steady else found, []
-
-    @property
-    def _goes_on_elsewhere(self) -> bool:
-        """Whether the run goes on with the flow of another, where references are of the case's own start."""
-        begun = self.info["start"].get("initial_run") if "start" in self.info else self.config.run.initial_run
-        return self.config.case.from_start and bool(begun)
-
-    def _settled(self, found: list[Measure]) -> list[Measure]:
-        """Return measures of a steady flow with a note on those that are another than a quarter of the run before."""
-        before = {measure.name: measure for measure in self.config.case.measures(_Until(self, 0.75))}
-        return [measure.settling(before[measure.name]) if measure.name in before else measure for measure in found]
+        return judged(self, self.config)
 
     @cached_property
     def gauges(self) -> GaugeRecord:
@@ -151,7 +112,7 @@ class Run(Loads):
         """Curves of the run beside their reference curves."""
         found = self.config.case.profiles(self)
         case = self.config.case
-        alone = case.is_driven or case.no_reference or self._goes_on_elsewhere
+        alone = case.is_driven or case.no_reference or goes_on_elsewhere(self, self.config)
         return [profile.alone() for profile in found] if alone else found
 
     @cached_property
@@ -172,7 +133,7 @@ class Run(Loads):
             *solved,
             *made(self.measures),
             *self._judged[1],
-            *([ELSEWHERE] if self._goes_on_elsewhere else []),
+            *([ELSEWHERE] if goes_on_elsewhere(self, self.config) else []),
             *case.remarks(),
         ]
         return [self.symbols(remark) for remark in found]
