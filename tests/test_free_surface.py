@@ -311,6 +311,14 @@ def test_first_pressure_of_a_patch():
     assert centre == pytest.approx(-0.1473, abs=1e-4)
 
 
+def test_a_drop_is_right_however_long_it_becomes(tmp_path):
+    """At 3.7 times its length; of a lattice along the axes nothing would be left inside."""
+    run = cases.EllipticalDrop(resolution=20).run(tmp_path / "drop", until=2.0, progress=False)
+    judged = [measure for measure in run.measures if not np.isnan(measure.reference)]
+    assert len(judged) == 5 and all(measure.passed for measure in judged), judged
+    assert not any("thin" in remark for remark in run.remarks)
+
+
 def test_exact_drop_keeps_its_energy():
     """It is as the integral of (A² a² + A² a⁻²)."""
     case = cases.EllipticalDrop()

@@ -141,7 +141,7 @@ FULL = (
     Entry("sloshing", (20, 40), until=20.5),
     Entry("sloshing", (20, 40), until=51.0, parameters=SWAY | {"frequency": 0.75}),
     Entry("sloshing", (20, 40), until=51.0, parameters=SWAY | {"frequency": 1.128}),
-    Entry("elliptical_drop", (10, 20, 40), until=0.8),
+    Entry("elliptical_drop", (10, 20, 40), until=2.0),
     Entry("rotating_patch", (20, 40), until=4.0),
     Entry("cavity", (25, 50, 100), until=24.0, parameters={"reynolds": 100}, continued=12.0),
     Entry("cavity", (50, 100), until=36.0, parameters={"reynolds": 400}, continued=18.0),
