@@ -276,6 +276,7 @@ def test_probes_as_a_table(vortices, alsph, tmp_path):
     assert columns["velocity_y"][row] == found.velocity[2, 1, 1] and columns["pressure"][row] == found.pressure[2, 1]
     code, stdout, stderr = alsph("export", vortices.path, "--probes", "-o", tmp_path / "probes.csv")
     assert code == 0 and "probes.csv" in stdout, stderr
+    assert stderr == "time in D/U, length in D, velocity in U, pressure in rho U^2\n"
     read = np.genfromtxt(tmp_path / "probes.csv", delimiter=",", names=True)
     for name, values in columns.items():
         np.testing.assert_allclose(read[name], values, rtol=1e-8, atol=1e-12)

@@ -6,8 +6,10 @@ import math
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field
 
+from alsph.arrays import FloatArray
 from alsph.cases.driven import Driven
 from alsph.engine.core import bytes_per_particle, time_step_limits
 from alsph.errors import ConfigError
@@ -30,6 +32,10 @@ class Discretised(Driven):
     def particle_spacing(self) -> float:
         """Particle spacing Δx [D]."""
         return 1.0 / self.resolution
+
+    def whole(self, lengths: ArrayLike, count: int = 1) -> FloatArray:
+        """Return lengths to the nearest multiple of `count` particle spacings [D]."""
+        return np.asarray(count * np.rint(np.asarray(lengths) / count * self.resolution) / self.resolution)
 
     def whole_cells(self, name: str, length: float) -> int:
         """Return how many particle spacings a `length` [D] is; it must be a whole number of them.

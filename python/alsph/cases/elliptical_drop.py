@@ -54,8 +54,9 @@ class EllipticalDrop(FreeSurface):
     def particles(self) -> Arrays:
         """Return those particles of a lattice that lie in the circle.
 
-        It is turned to where this flow brings it back onto itself whenever the drop is 2.6 times longer (Kraynik and Reinelt, Int. J. Multiphase
-        Flow 18, 1992), so that no particle loses its neighbours; along the axes its columns would draw apart for good.
+        It is turned to where this flow brings it back onto itself whenever the drop is 2.6 times longer (Kraynik and
+        Reinelt, Int. J. Multiphase Flow 18, 1992), so that no particle loses its neighbours; along the axes its columns
+        would draw apart for good.
         """
         cells = 4 * self.resolution  # a square that covers the circle however it is turned
         axis = cell_centres(cells, self.particle_spacing) - cells * self.particle_spacing / 2

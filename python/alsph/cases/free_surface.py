@@ -285,10 +285,6 @@ class FreeSurface(Case):
         """Return about how many particles there are: those of the fluid."""
         return round(self.initial_volume * float(self.resolution) ** self.space_dimensions)
 
-    def whole(self, lengths: ArrayLike, count: int = 1) -> FloatArray:
-        """Return lengths to the nearest multiple of `count` particle spacings [D]."""
-        return np.asarray(count * np.rint(np.asarray(lengths) / count * self.resolution) / self.resolution)
-
     def fluid(self, position: FloatArray, velocity: FloatArray, pressure: FloatArray) -> Arrays:
         """Return fluid particles, whose pressure is not below that of the air unless tension is allowed."""
         pressure = pressure if self.tension else np.maximum(pressure, 0.0)

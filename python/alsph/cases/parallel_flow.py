@@ -32,19 +32,14 @@ class ParallelFlow(Case):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        if self._columns < self.support_layers:
+        if round(self.length * self.resolution) < self.support_layers:
             raise ValueError(f"length = {self.length:g}: shorter than the kernel's support radius; use a longer one")
         return self
 
     @property
-    def _columns(self) -> int:
-        """Particle spacings in a period."""
-        return round(self.length * self.resolution)
-
-    @property
     def _period(self) -> float:
         """The period, to a whole number of spacings [D]."""
-        return self._columns / self.resolution
+        return float(self.whole(self.length))
 
     @abstractmethod
     def place(self, position: FloatArray) -> FloatArray:

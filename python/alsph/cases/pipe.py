@@ -81,5 +81,5 @@ class Pipe(ParallelFlow):
         corner = np.full(2, RADIUS)
         outside = Volume(lambda points: RADIUS - np.hypot(*points.T), -corner, corner, 1 - np.pi * RADIUS**2, 1.0)
         section = pack(cells, outside, wall.position, spacing)
-        columns = cell_centres(self._columns, spacing)
+        columns = cell_centres(round(self.length * self.resolution), spacing)
         return join(particles(Kind.FLUID, extruded(columns, section), 0.0), wall.extruded(columns).particles())

@@ -153,13 +153,9 @@ class Sloshing(FreeSurface):
         return Domain([0, 0], [self._whole_length, self.tank_height], [("slip", "slip"), ("slip", "air")])
 
     @property
-    def _columns(self) -> int:
-        return round(self.length * self.resolution)
-
-    @property
     def _whole_length(self) -> float:
         """The length, to a whole number of particles."""
-        return self._columns / self.resolution
+        return float(self.whole(self.length))
 
     @property
     def initial_volume(self) -> float:
@@ -169,7 +165,9 @@ class Sloshing(FreeSurface):
     def particles(self) -> Arrays:
         """Return a lattice at rest with the hydrostatic pressure."""
         spacing = self.particle_spacing
-        position = lattice(cell_centres(self._columns, spacing), cell_centres(self.resolution, spacing))
+        position = lattice(
+            cell_centres(round(self.length * self.resolution), spacing), cell_centres(self.resolution, spacing)
+        )
         return self.fluid(position, np.zeros_like(position), 1 - position[:, 1])
 
     def forcing(self, position: FloatArray, time: float) -> ArrayLike | None:

@@ -278,7 +278,7 @@ def _export(
     ParaView 5.12 or later reads vtkhdf; netcdf needs pip install 'alsph[tables]'. Bodies are NaN. What probes recorded
     is written as a table, a row for each time and point.
     """
-    from alsph.results.export import FORMATS, save_probes
+    from alsph.results.export import FORMATS, save_probes, told_units
 
     if to is not None:
         choose("to", to, FORMATS)
@@ -293,6 +293,7 @@ def _export(
         if extra := [name for name, given in of_fields.items() if given is not None]:
             raise ConfigError(f"--probes: not with --{extra[0]}, which is of the fields")
         say(save_probes(run.probes, output or path / f"probes{suffix}.csv", units))
+        complain(told_units(["velocity", "pressure"], run.symbols, si=si))
         return
     grid = run.to_grid(time, spacing, derived=field or [])
     if time is not None:
@@ -300,3 +301,4 @@ def _export(
     if units:
         grid = grid.in_si(units)
     say(grid.save(output or path / f"flow{suffix}{FORMATS[to or 'vtkhdf']}"))
+    complain(told_units(grid.fields, grid.symbols, si=si))

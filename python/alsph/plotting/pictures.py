@@ -37,6 +37,8 @@ TALLEST = 1.5  # height over width, beyond which the picture is made narrower th
 
 INSIDE = 0.75  # share of the space around that fluid fills, above which it is neither at a free surface nor spray
 
+AIR = "0.88"  # colour beside a free surface: spray without pressure is white
+
 LARGEST_VIEW = 20_000  # spacings that a picture is wide or high at most
 
 
@@ -148,7 +150,7 @@ def fields(
     left, right, bottom, top = part = extent_of(first, spacing, view)
     width = 6.5
     height = 0.85 * width * (top - bottom) / (right - left) + 0.6
-    figure = blank(width * len(names), height * len(snapshots))
+    figure = blank(width * len(names), height * len(snapshots), "compressed")
     grid = figure.subplots(len(snapshots), len(names), squeeze=False)
     for column, name in zip(grid.T, names, strict=True):
         limit: float | None = None
@@ -176,6 +178,8 @@ def _draw_field(
     limit = limit or _limit(picture[inside])
     lowest = -limit if style.signed else 0.0
     scale: dict[str, Any] = {"cmap": style.colours, "vmin": lowest, "vmax": limit}
+    if meets_air(snapshot):
+        axes.set_facecolor(AIR)
     image = axes.imshow(picture, extent=extent, origin="lower", interpolation="bilinear", **scale)
     if body.any():
         sides = zip(body.shape[::-1], np.reshape(extent, (2, 2)), strict=True)

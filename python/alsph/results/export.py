@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -315,6 +315,11 @@ def _unit(field: str, symbols: Symbols, si: bool) -> str:
         unit = QUANTITIES[quantity][0]
         return unit if power == 1 else f"{unit}^{power}"
     return symbols(UNITS[field]) if field in UNITS else symbols.time if field == "time" else symbols.length
+
+
+def told_units(fields: Iterable[str], symbols: Symbols = GENERAL, *, si: bool = False) -> str:
+    """Return in words what times, lengths and fields are in, which a table's file does not say."""
+    return ", ".join(f"{name.replace('_', ' ')} in {_unit(name, symbols, si)}" for name in ("time", "length", *fields))
 
 
 def _dataset(axes: dict[str, FloatArray], fields: dict[str, FloatArray], symbols: Symbols, si: bool) -> xarray.Dataset:

@@ -114,10 +114,12 @@ def _several(case: Case) -> list[tuple[str, str]]:
     if not isinstance(case, Bodies) or not (middles := case.middles()):
         return []
     extents = [(right - left, top - bottom) for left, bottom, right, top in (body.bounds for body in case.outlines)]
-    return [
+    lines = [
         (name, f"{length:.4g} D by {height:.4g} D about x = {x:.4g} D, y = {y:.4g} D")
         for (name, (x, y)), (length, height) in zip(middles.items(), extents, strict=True)
-    ][:MOST_BODIES]
+    ]
+    left = len(lines) - MOST_BODIES
+    return lines[:MOST_BODIES] + [("further bodies", f"{left}, to {lines[-1][0]}")] * (left > 0)
 
 
 def _in_si(units: Units, step: float, until: float) -> list[tuple[str, str]]:
