@@ -54,9 +54,15 @@ def test_a_reference_holds_where_its_theory_does(case, beyond):
     assert [(measure.name, measure.source) for measure in told] == [("a", "")] and math.isnan(told[0].reference)
 
 
-def test_a_wave_so_steep_that_its_start_is_packed_says_so():
-    assert "not to be trusted" in about(StandingWave(amplitude=0.2), "steep")[0]
-    assert "not to be trusted" not in about(StandingWave(amplitude=0.1), "steep")[0]
+def test_a_steep_wave_begins_with_its_volume_and_decays_as_a_low_one(tmp_path):
+    case = StandingWave(amplitude=0.2, resolution=20)
+    assert "4.9 % lower" in about(case, "steep")[0] and not about(StandingWave(), "steep")
+    position = case.particles()["position"]
+    assert 1.26 < position[:, 1].max() + case.particle_spacing / 2 < 1.32  # of Stokes's second order: 1.263
+    run = case.run(tmp_path / "run", progress=False)
+    frequency, decay = run.measures[:2]
+    assert 0.99 < run.history["packing_min"][0] and run.history["packing_max"][0] < 1.02
+    assert -0.06 < frequency.error < -0.03 and decay.passed, run.measures
 
 
 def test_a_viscous_drop_is_beside_nothing(tmp_path):

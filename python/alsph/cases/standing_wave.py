@@ -17,9 +17,6 @@ from alsph.geometry.lattice import cell_centres, lattice
 WAVE = np.pi
 """Wave number k [1/H]: half a wave in a tank as long as it is deep."""
 
-STEEP = 0.1
-"""Amplitude [H] up to which the displacement of linear theory leaves the volume as it is within 10 %."""
-
 VISCOUS = 50.0
 """Reynolds number below which the flow that begins at rest is not that of the mode alone, by more than 1 %."""
 
@@ -96,12 +93,7 @@ class StandingWave(FreeSurface):
         """Return what is to be borne in mind: a wave so steep that it is not that of linear theory."""
         steep = (WAVE * self.amplitude) ** 2 / 8
         told = f"steep: a wave of ka = {WAVE * self.amplitude:.2g} is compared with linear theory"
-        lower = f"its frequency is about {100 * steep:.2g} % lower"
-        if self.amplitude > STEEP:
-            lower += (
-                ", and its start, right to first order, packs particles by the crest: its decay is not to be trusted"
-            )
-        return super().remarks() + [f"{told}; {lower}"] * (steep > 0.005)
+        return super().remarks() + [f"{told}; its frequency is about {100 * steep:.2g} % lower"] * (steep > 0.005)
 
     @property
     def no_reference(self) -> str:
