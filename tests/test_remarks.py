@@ -121,6 +121,9 @@ ELLIPSE = affinity.scale(shapely.Point(0, 0).buffer(1, quad_segs=64), 0.5, 0.2)
         (shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(2, 0, 2.1, 1)]), 0.1),
         (shapely.Polygon([(0, 0), (1, 0.1), (1, -0.1)]), 0.0),
         (shapely.box(0, 0, 1e-3, 1e-3), 1e-3),
+        (shapely.box(0, 0, 1, 1) - shapely.box(0.3, 0.3, 0.7, 0.7), 0.3),  # in the corners discs of 0.35 fit in
+        (shapely.Point(0, 0).buffer(0.5) - shapely.Point(0.05, 0).buffer(0.4), 0.05),
+        (shapely.Point(0, 0).buffer(0.3) | shapely.Point(0.62, 0).buffer(0.3) | shapely.box(0, -0.1, 0.62, 0.1), 0.2),
     ],
 )
 def test_thickness_of_the_thinnest_part(shape, thickness):

@@ -190,11 +190,16 @@ def channel(size: float, inlet: float, outlet: float, share: float, slowed: floa
 
 
 def protrusion(shape: Polygon | MultiPolygon, thickness: float) -> float:
-    """Return how far [D] parts of a shape thinner than `thickness` reach beyond its thicker ones; inf if all are."""
-    thicker = shape.buffer(-0.5 * thickness).buffer(0.5 * thickness)
-    if thicker.is_empty:
+    """Return how far [D] parts of a shape thinner than `thickness` reach beyond its thicker ones.
+
+    It is infinite where all are, and where they are what holds it together, such as the wall around a hole.
+    """
+    core = shape.buffer(-0.5 * thickness)
+    if core.is_empty or shapely.get_num_geometries(core) > shapely.get_num_geometries(shape):
         return math.inf
-    return reach(shape, thicker, 0.5 * thickness)
+    if len(thin_bodies.holes(core)) < len(thin_bodies.holes(shape)):
+        return math.inf
+    return reach(shape, core.buffer(0.5 * thickness), 0.5 * thickness)
 
 
 def reach(shape: Polygon | MultiPolygon, rest: Polygon | MultiPolygon, step: float) -> float:
@@ -212,9 +217,9 @@ def tip(shape: Polygon | MultiPolygon, rest: Polygon | MultiPolygon, step: float
 
 
 def thinnest(shape: Polygon | MultiPolygon) -> float:
-    """Return the thickness [D] of the thinnest part of a shape that reaches out farther than it is thick.
+    """Return the thickness [D] of the thinnest part of a shape, of those that reach out farther than they are thick.
 
-    It is 0 where the shape tapers to an edge of less than 39 degrees; other corners are no thin parts.
+    Of what holds it together, too, such as the wall around a hole. It is 0 where the shape tapers to an edge of less than 39 degrees; other corners are no thin parts.
     """
     left, bottom, right, top = shape.bounds
     size = max(right - left, top - bottom)
