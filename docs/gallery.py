@@ -28,7 +28,7 @@ FIELDS = {
     "sloshing": "pressure",
     "rolling_tank": "pressure",
     "rotating_patch": "pressure",
-    "standing_wave": "velocity",
+    "standing_wave": "pressure",
     "still_water": "pressure",
     "taylor_green": "vorticity",
 }
@@ -58,7 +58,7 @@ def draw(case: str) -> None:
     run = alsph.open_run(RUNS / case)
     profile = next((each for each in run.profiles if case in PROFILES or not (case in FIELDS or run.body)), None)
     figure = run.plot_profile(profile) if profile else run.plot_field(FIELDS.get(case, "vorticity"))
-    figure.savefig(HERE / "images" / "gallery" / f"{case}.png", dpi=65, pil_kwargs={"optimize": True})
+    figure.savefig(HERE / "images" / "gallery" / f"{case}.png", dpi=90, pil_kwargs={"optimize": True})
 
 
 if __name__ == "__main__":

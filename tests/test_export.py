@@ -6,6 +6,7 @@ import sys
 import alsph as package
 import numpy as np
 import pytest
+import pyvista
 import xarray
 from alsph.errors import ConfigError, RunFolderError
 from alsph.results.export import PlaneRecord
@@ -70,7 +71,7 @@ def test_an_image_in_3d_has_its_axes_in_order(turning, tmp_path):
 
 
 def test_all_formats_hold_the_same(cylinder, alsph):
-    for to, name in (("vtkhdf", "flow.vtkhdf"), ("netcdf", "flow.nc"), ("csv", "flow.csv")):
+    for to, name in (("vtkhdf", "flow.vtkhdf"), ("vti", "flow.vti"), ("netcdf", "flow.nc"), ("csv", "flow.csv")):
         code, out, _ = alsph("export", cylinder.path, "--to", to, "--spacing", 0.2)
         assert code == 0 and out.strip() == str(cylinder.path / name)
     points, fields, _ = read_with_vtk(cylinder.path / "flow.vtkhdf")
@@ -83,6 +84,17 @@ def test_all_formats_hold_the_same(cylinder, alsph):
     assert rows["velocity_x"] == pytest.approx(fields["velocity"][:, 0], nan_ok=True, abs=1e-5)
 
 
+@pytest.mark.parametrize("run", ["cylinder", "turning"])
+def test_images_of_xml_are_those_of_hdf(run, request, tmp_path):
+    grid = request.getfixturevalue(run).to_grid(spacing=0.1)
+    points, fields, time = read_with_vtk(grid.save(tmp_path / "flow.vtkhdf"))
+    image = pyvista.read(grid.save(tmp_path / "flow.vti"))
+    np.testing.assert_allclose(image.points, points, atol=1e-12)
+    assert image.field_data["TimeValue"] == [time] and set(image.point_data.keys()) == set(fields)
+    for name, values in fields.items():
+        np.testing.assert_array_equal(image.point_data[name], values)
+
+
 def test_force_removes_what_was_exported(cylinder, tmp_path):
     case = package.cases.TaylorGreen(resolution=8)
     run = case.run(tmp_path / "run", until=0.02, progress=False)
@@ -93,8 +105,8 @@ def test_force_removes_what_was_exported(cylinder, tmp_path):
 
 def test_what_cannot_be_exported_is_refused_and_nothing_is_written(cylinder, alsph, tmp_path):
     for options, words in (
-        (("--to", "vti"), "to = 'vti': unknown; known: vtkhdf, netcdf, csv"),
-        (("--output", tmp_path / "flow.vti"), "ends in .vtkhdf, .nc, .csv"),
+        (("--to", "vtu"), "to = 'vtu': unknown; did you mean 'vti'?"),
+        (("--output", tmp_path / "flow.vtu"), "ends in .vtkhdf, .vti, .nc, .csv"),
         (("--to", "csv", "--output", tmp_path / "flow.nc"), "in the format csv ends in .csv"),
         (("--spacing", "0"), "spacing = 0.0: must be a number above zero"),
         (("--spacing", "1e-6"), "more than 20,000,000 points"),

@@ -228,6 +228,11 @@ def test_a_case_of_ones_own_is_validated_at_its_own_resolution_or_those_given(al
 
 
 def test_cases_that_cannot_be_validated(tmp_path):
+    (tmp_path / "own.py").write_text(
+        "from alsph.cases import CylinderPair\n\n\nclass Pair(CylinderPair):\n    height: float = 8.0\n"
+    )
+    with pytest.raises(ConfigError, match="own.py:Pair: nothing of it is compared; give it `measures`"):
+        validate(f"{tmp_path}/own.py:Pair", output=tmp_path / "out")
     with pytest.raises(ConfigError, match="cylinder_pair: in no suite, it has no reference; alsph run"):
         validate("cylinder_pair", output=tmp_path / "out")
     for folder in ("one", "two"):

@@ -519,7 +519,8 @@ def test_the_page_needs_nothing_from_elsewhere():
     assert "innerHTML" not in page and "sha256-" in server.policy(server.page())
 
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+BROWSERS = map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
+BROWSER = os.environ.get("ALSPH_BROWSER") or next(filter(None, BROWSERS), None)
 
 
 @pytest.fixture

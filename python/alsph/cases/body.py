@@ -64,8 +64,9 @@ class Body(Bodies):
             return Outline(**shape)
         if isinstance(shape, str | os.PathLike):
             if not os.path.exists(shape):
-                told = "neither square_cylinder nor a NACA airfoil (naca0012) nor a file that is there"
-                raise ConfigError(told) if os.path.splitext(shape)[1] else ValueError(told)
+                if os.path.splitext(shape)[1]:
+                    raise ConfigError("no such file")
+                raise ValueError("neither square_cylinder nor a NACA airfoil (naca0012) nor a file that is there")
             return Outline.read(shape)
         return shape if isinstance(shape, Outline) else Outline.of(shape)
 

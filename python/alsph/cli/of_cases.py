@@ -55,9 +55,8 @@ def _describe(
     finally:  # bodies that are refused are drawn all the same
         if target and (state or isinstance(case, cases.Bodies)):
             alsph.plotting.save(alsph.plotting.start(case, state, given.config.probes), target, dpi=DPI)
+            say(target)
     say_table(describe(given.config, state, probe=probe))
-    if target:
-        say(f"\n{target}")
 
 
 def _picture(path: Path | None) -> Path | None:

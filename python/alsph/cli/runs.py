@@ -269,14 +269,14 @@ def _export(
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", "-o", help="file, .vtkhdf, .nc or .csv", show_default="RUN/flow.vtkhdf, RUN/probes.csv"
+            "--output", "-o", help="file, .vtkhdf, .vti, .nc or .csv", show_default="RUN/flow.vtkhdf, RUN/probes.csv"
         ),
     ] = None,
 ) -> None:
     """Write a snapshot of a run on a regular grid, for other programs: velocity, pressure and vorticity.
 
-    ParaView 5.12 or later reads vtkhdf; netcdf needs pip install 'alsph[tables]'. Bodies are NaN. What probes recorded
-    is written as a table, a row for each time and point.
+    ParaView 5.12 or later reads vtkhdf, any reads vti, which needs pip install 'alsph[3d]'; netcdf needs
+    'alsph[tables]'. Bodies are NaN. What probes recorded is written as a table, a row for each time and point.
     """
     from alsph.results.export import FORMATS, save_probes, told_units
 

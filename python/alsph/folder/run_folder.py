@@ -45,7 +45,7 @@ MARKS = ("case.toml", "run.json")
 """What tells that a folder is a run folder."""
 OWN = re.compile(
     r"\.?(case\.toml|run\.json|run\.log|\.?lock|(checkpoint(\.previous)?|history|particles|surface|(probes|flow)(_si)?|planes|gauges|start|breakdown)(\.damaged\d*)?"
-    r"\.(h5|csv|vtkhdf|nc))(\.new|\.journal)?"
+    r"\.(h5|csv|vtkhdf|vti|nc))(\.new|\.journal)?"
     r"|(ledger|gauges|((forces|spectrum|pressure_coefficient)(_of_\w+)?)|pressure|vorticity|velocity(_divergence|_at_tu_d_\w+|_at_\d+_degrees_\w+)?|q_criterion|lambda_2|kinetic_energy"
     r"|[uv]_at_[xy]_d_2|front(_\w+_19\d\d)?|pressure_at_\w+|elevation_at_the_gauge(_experiment)?|heave|flow_rate|velocity_downstream"
     r"|force_coefficient_over_the_last_period|(velocity_in_front_of|force_on)_the_structure|velocity_of_the_sphere"

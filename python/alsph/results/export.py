@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 MOST_POINTS, LARGEST = 20_000_000, 1e15
 
-FORMATS = {"vtkhdf": ".vtkhdf", "netcdf": ".nc", "csv": ".csv"}
+FORMATS = {"vtkhdf": ".vtkhdf", "vti": ".vti", "netcdf": ".nc", "csv": ".csv"}
 """Formats of grids, and how their files end."""
 UNITS = {"velocity": "U", "pressure": "rho U^2", "vorticity": "U/D", **dict.fromkeys(DERIVED, "U^2/D^2")}
 IN_SI: dict[str, tuple[Quantity, int]] = {
@@ -49,7 +49,7 @@ IN_SI: dict[str, tuple[Quantity, int]] = {
 }
 """Quantity of each field, and its exponent."""
 
-EXPORTED = re.compile(r"(flow(_si)?\.(vtkhdf|nc|csv))|(probes(_si)?\.csv)")
+EXPORTED = re.compile(r"(flow(_si)?\.(vtkhdf|vti|nc|csv))|(probes(_si)?\.csv)")
 """Files of a run folder that may be written again."""
 
 
@@ -138,18 +138,23 @@ class Grid(InUnits):
         Parameters
         ----------
         path : path
-            ``.vtkhdf``, image data for ParaView 5.12 or later; ``.nc``, NetCDF (``pip install 'alsph[tables]'``); or
-            ``.csv``, one row a point.
+            ``.vtkhdf``, image data for ParaView 5.12 or later; ``.vti``, the same for any (``pip install 'alsph[3d]'``);
+            ``.nc``, NetCDF (``pip install 'alsph[tables]'``); or ``.csv``, one row a point.
 
         Raises
         ------
         ConfigError
-            If the format is unknown, or xarray is not installed.
+            If the format is unknown, or a library that it needs is not installed.
         RunFolderError
             If the file is a link or a special file.
         """
         path = Path(path)
-        write = {".vtkhdf": self._write_image, ".nc": self._write_netcdf, ".csv": self._write_csv}
+        write = {
+            ".vtkhdf": self._write_image,
+            ".vti": self._write_xml_image,
+            ".nc": self._write_netcdf,
+            ".csv": self._write_csv,
+        }
         if path.suffix not in write:
             raise ConfigError(f"{path}: a grid is written to a file that ends in {', '.join(write)}")
         _check(path)
@@ -157,10 +162,30 @@ class Grid(InUnits):
             write[path.suffix](temporary)
         return path
 
+    def _frame(self) -> tuple[list[float], list[float]]:
+        """Return the first point and the distances of points along the axes."""
+        lines = self.axes.values()
+        return [line[0] for line in lines], [line[1] - line[0] if len(line) > 1 else 1.0 for line in lines]
+
     def _write_image(self, path: Path) -> None:
-        origin = [line[0] for line in self.axes.values()]
-        spacing = [line[1] - line[0] if len(line) > 1 else 1.0 for line in self.axes.values()]
-        vtkhdf.write_image(path, self.time, origin, spacing, self.fields)
+        vtkhdf.write_image(path, self.time, *self._frame(), self.fields)
+
+    def _write_xml_image(self, path: Path) -> None:
+        origin, spacing = self._frame()
+        counts = [*map(len, self.axes.values())]
+        more = 3 - len(counts)
+        image = _library("pyvista", "3d").ImageData(
+            dimensions=counts + [1] * more, spacing=spacing + [1.0] * more, origin=origin + [0.0] * more
+        )
+        for name, values in self.fields.items():
+            vector = vtkhdf.three_components(values) if values.ndim > len(counts) else values[..., None]
+            columns = [vector[..., k].ravel(order="F") for k in range(vector.shape[-1])]  # the first axis fastest
+            image.point_data[name] = np.stack(columns, axis=1).squeeze().astype(np.float32)
+        image.field_data["TimeValue"] = [self.time]
+        writer = import_module("vtkmodules.vtkIOXML").vtkXMLImageDataWriter()
+        writer.SetFileName(str(path))
+        writer.SetInputData(image)
+        writer.Write()
 
     def _write_netcdf(self, path: Path) -> None:
         self.to_xarray().to_netcdf(path, engine="scipy")

@@ -333,10 +333,19 @@ def _chosen(names: Sequence[str], full: bool, suite: Sequence[Entry] | None) -> 
             told = "only in the full suite, which takes longer; use --full (full=True)"
             raise ConfigError(f"{name}: {told if longer else f'in no suite, it has no reference; alsph run {name}'}")
         if not entries:
+            if not _is_compared(model):
+                told = "nothing of it is compared; give it `measures` with references, or"
+                raise ConfigError(f"{name}: {told} see what comes of it: alsph run {name}")
             case = model()
             entries = [Entry(name, (case.resolution,), until=case.default_until)]
         chosen[model.name] = entries
     return [entry for entries in chosen.values() for entry in entries]
+
+
+def _is_compared(model: type[cases.Case]) -> bool:
+    """Return whether a class has measures beside those of every body in a channel, which have no reference."""
+    general = (cases.Case, cases.Channel, cases.Bodies, cases.Spatial)
+    return any(vars(parent).keys() & {"measures", "_reference"} for parent in model.__mro__ if parent not in general)
 
 
 class _Heading:
