@@ -219,7 +219,8 @@ def tip(shape: Polygon | MultiPolygon, rest: Polygon | MultiPolygon, step: float
 def thinnest(shape: Polygon | MultiPolygon) -> float:
     """Return the thickness [D] of the thinnest part of a shape, of those that reach out farther than they are thick.
 
-    Of what holds it together, too, such as the wall around a hole. It is 0 where the shape tapers to an edge of less than 39 degrees; other corners are no thin parts.
+    Of what holds it together, too, such as the wall around a hole. It is 0 where the shape tapers to an edge of less
+    than 39 degrees; other corners are no thin parts.
     """
     left, bottom, right, top = shape.bounds
     size = max(right - left, top - bottom)

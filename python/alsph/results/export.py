@@ -138,7 +138,7 @@ class Grid(InUnits):
         Parameters
         ----------
         path : path
-            ``.vtkhdf``, image data for ParaView 5.12 or later; ``.vti``, the same for any (``pip install 'alsph[3d]'``);
+            ``.vtkhdf``, image data for ParaView 5.12 or later; ``.vti``, the same for any (``alsph[3d]``);
             ``.nc``, NetCDF (``pip install 'alsph[tables]'``); or ``.csv``, one row a point.
 
         Raises
