@@ -185,7 +185,8 @@ def _draw_field(
         sides = zip(body.shape[::-1], np.reshape(extent, (2, 2)), strict=True)
         x, y = (np.concatenate([[low], _centres(count, low, high), [high]]) for count, (low, high) in sides)
         axes.contourf(x, y, np.pad(body, 1, mode="edge"), levels=[0.5, np.inf], colors=["0.35"])
-    label = style.label + (", less its mean" if name == "pressure" and _is_closed(snapshot) else "")
+    datum = _datum(snapshot) if name == "pressure" else None
+    label = style.label + (f", {datum[1]}" if datum else "")
     above = name == "pressure" and meets_air(snapshot) and not np.nanmin(picture, initial=0.0) < 0
     ends = "both" if style.signed and not above else "max"
     bar = axes.figure.colorbar(image, ax=axes, label=label, extend=ends, pad=0.02, fraction=0.05)
@@ -226,14 +227,22 @@ def _values(snapshot: Snapshot, name: str, whole: Snapshot, spacing: float) -> F
     if name in DERIVED:
         return DERIVED[name](sampling.velocity_gradient(whole, snapshot.position[snapshot.fluid], spacing))
     values = np.linalg.norm(snapshot.velocity, axis=1) if name == "velocity" else getattr(snapshot, name)
-    if name == "pressure" and _is_closed(snapshot):
-        values = values - values[snapshot.fluid].mean()  # which means nothing, and would leave one colour
+    if name == "pressure" and (datum := _datum(whole)):
+        values = values - whole.pressure[datum[0]].mean()
     return np.asarray(values[snapshot.fluid])
 
 
-def _is_closed(snapshot: Snapshot) -> bool:
-    """Whether no fluid enters or leaves nor meets the air, so that the pressure is known but for a constant."""
-    return not meets_air(snapshot) and not np.isin(snapshot.kind, (Kind.INLET, Kind.OUTLET)).any()
+def _datum(snapshot: Snapshot) -> tuple[NDArray[np.bool_], str] | None:
+    """Return what particles (n,) the pressure is told over the mean of, and in words.
+
+    Those of the inlet, as C_p is, or all where no fluid enters or leaves nor meets the air, so that the pressure is
+    known but for a constant, which would leave one colour.
+    """
+    if (inlet := snapshot.kind == Kind.INLET).any():
+        return inlet, "less the inlet's"
+    if meets_air(snapshot) or (snapshot.kind == Kind.OUTLET).any():
+        return None
+    return snapshot.fluid, "less its mean"
 
 
 def meets_air(snapshot: Snapshot) -> bool:
