@@ -314,6 +314,21 @@ class Turning(cases.Couette):
         return state
 
 
+@pytest.mark.filterwarnings("ignore:Field name")  # what pydantic says of it
+def test_a_parameter_that_would_be_ignored_is_refused(tmp_path):
+    """Coefficients are formed with what the class says, or nothing says it."""
+    text = "from typing import ClassVar\n\nfrom alsph.cases import Cylinder\n\n\nclass Half(Cylinder):\n    {}\n"
+    (tmp_path / "own.py").write_text(text.format("reference_area: float = 2.0"))
+    with pytest.raises(ConfigError, match="'reference_area' is a property of Case, no parameter; make it a property"):
+        cases.find(f"{tmp_path}/own.py:Half")
+    (tmp_path / "other.py").write_text(text.format("reference_area: ClassVar[float] = 2.0"))
+    drag = {}
+    for model in (cases.Cylinder, cases.find(f"{tmp_path}/other.py:Half")):
+        run = model(resolution=8).run(tmp_path / model.__name__, until=0.1, progress=False)
+        drag[model.__name__] = run.drag.mean
+    assert drag["Cylinder"] == pytest.approx(2 * drag["Half"])
+
+
 def test_velocities_of_solid_particles_that_are_not_used_are_warned_of():
     case = Turning(resolution=8)
     body = case.bodies()[0]

@@ -147,6 +147,7 @@ def test_the_step_follows_the_sound_and_is_described():
     lines = dict(describe(Config(slow), probe=False))
     assert "artificial Mach number" in lines["speed of sound"] and lines["acoustic limit"].endswith("(binds)")
     assert any(remark.startswith("other scheme: wcsph") for remark in slow.remarks())
+    assert any("C_p on a cylinder erred" in remark for remark in Cylinder(scheme="isph").remarks())
     assert not any("growing sound" in remark for remark in slow.remarks())
     assert any("growing sound" in remark for remark in slow.replace(wall_pressure="linear").remarks())
     with pytest.raises(ConfigError, match="scheme = wcsph: only steps and iterations of alsph can be tuned"):

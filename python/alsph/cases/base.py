@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import inspect
+import itertools
 import math
 import re
 import warnings
 from abc import abstractmethod
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -22,6 +24,7 @@ from alsph.cases.method import Method
 from alsph.engine.output import Output
 from alsph.engine.problem import Problem
 from alsph.engine.simulation import Simulation
+from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
 from alsph.parameters import Parameters
@@ -107,8 +110,12 @@ class Case(Discretised):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
-        """Name a class that has no name of its own or its bases'."""
+        """Name a class that has no name of its own or its bases', and refuse parameters that nothing would ask for."""
         super().__pydantic_init_subclass__(**options)
+        for name, parent in itertools.product(cls.model_fields, cls.__mro__[1:]):
+            if isinstance(vars(parent).get(name), property | cached_property):
+                told = f"no parameter; make it a property, too, or `{name}: ClassVar[...] = ...`"
+                raise ConfigError(f"{cls.__name__}: '{name}' is a property of {parent.__name__}, {told}")
         if not inspect.isabstract(cls):
             for name, of in (("name", name_of), ("title", title_of)):
                 if not hasattr(cls, name):
