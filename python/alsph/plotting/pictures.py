@@ -184,7 +184,7 @@ def _draw_field(
     if body.any():
         sides = zip(body.shape[::-1], np.reshape(extent, (2, 2)), strict=True)
         x, y = (np.concatenate([[low], _centres(count, low, high), [high]]) for count, (low, high) in sides)
-        axes.contourf(x, y, np.pad(body, 1, mode="edge"), levels=[0.5, np.inf], colors=["0.35"])
+        axes.contourf(x, y, np.pad(body, 1, mode="edge"), [0.5, np.inf], colors=["0.35"], antialiased=True)
     datum = _datum(snapshot) if name == "pressure" else None
     label = style.label + (f", {datum[1]}" if datum else "")
     above = name == "pressure" and meets_air(snapshot) and not np.nanmin(picture, initial=0.0) < 0
