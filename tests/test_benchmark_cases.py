@@ -397,7 +397,7 @@ def test_body_from_a_file(tmp_path):
         ),
         ("0 0\n1 1\n", 'curve.csv:1: "0 0": .*three or more'),
         ("x\n0 a\n", 'curve.csv:2: "0 a": two numbers expected'),
-        (None, "neither"),
+        (None, "no such file"),
     ],
 )
 def test_body_refuses_what_is_no_curve(content, problem, tmp_path):

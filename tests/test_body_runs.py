@@ -129,7 +129,7 @@ def test_a_run_folder_of_old_opens_where_its_outline_is(folder, tmp_path, monkey
     assert alsph("info", "run")[0] == 0
     monkeypatch.chdir(tmp_path)
     code, _, error = alsph("info", path)
-    assert code == 2 and "square.txt': neither" in error and "go to where it was run" in error
+    assert code == 2 and "square.txt': no such file" in error and "go to where it was run" in error
     (path / "square.txt").write_text(SQUARE)
     assert alsph("info", path)[0] == 0
     resume(path, until=0.2, progress=False)
@@ -152,7 +152,7 @@ def test_a_hostile_run_folder_ends_in_one_line(shape, folder, small, alsph):
 def test_the_message_of_an_unknown_shape_names_what_there_is():
     with pytest.raises(
         ConfigError,
-        match="shape = 'wedge.dat': neither square_cylinder nor a NACA airfoil",
+        match="shape = 'wedge.dat': no such file; shapes by name are square_cylinder and NACA airfoils",
     ):
         Body(shape="wedge.dat")
 

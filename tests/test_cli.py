@@ -87,7 +87,7 @@ def test_what_is_not_used_is_not_loaded(program, loaded):
         ("alsph run dam_break --sm", ["--smoothing-ratio"]),
         ("alsph plot runs/a --field v", ["vorticity", "velocity", "velocity_divergence"]),
         ("alsph plot runs/a --format p", ["png", "pdf"]),
-        ("alsph export runs/a --to ", ["vtkhdf", "netcdf", "csv"]),
+        ("alsph export runs/a --to ", ["vtkhdf", "vti", "netcdf", "csv"]),
         ("alsph study run rey", ["reynolds"]),
         ("alsph validate cav", []),
         ("alsph validate --full cav", ["cavity"]),

@@ -65,7 +65,7 @@ class Body(Bodies):
         if isinstance(shape, str | os.PathLike):
             if not os.path.exists(shape):
                 if os.path.splitext(shape)[1]:
-                    raise ConfigError("no such file")
+                    raise ConfigError("no such file; shapes by name are square_cylinder and NACA airfoils (naca0012)")
                 raise ValueError("neither square_cylinder nor a NACA airfoil (naca0012) nor a file that is there")
             return Outline.read(shape)
         return shape if isinstance(shape, Outline) else Outline.of(shape)
