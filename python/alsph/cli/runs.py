@@ -23,7 +23,7 @@ from alsph.tables import markdown
 
 FIELDS = ("vorticity", "pressure", "velocity", "velocity_divergence", "q_criterion", "lambda_2")
 DERIVED = FIELDS[4:]
-GRIDS = ("vtkhdf", "netcdf", "csv")
+GRIDS = ("vtkhdf", "vti", "netcdf", "csv")
 """What alsph.plotting and alsph.results.export, which help need not wait for, know by these names."""
 
 FEW = 20
