@@ -129,7 +129,7 @@ def test_files_and_options(tmp_path, alsph):
     code, _, told = alsph("describe", path, "--reynolds", 100, "--no-probe")
     assert code == 2 and "reynolds = 100: the units" in told
     code, _, told = alsph("describe", "cylinder", "--units-velocity", 0.02, "--no-probe")
-    assert code == 2 and "give --units-length, --units-density and --units-kinematic-viscosity, too" in told
+    assert code == 2 and "give --units-length, --units-density, --units-kinematic-viscosity, too" in told
 
 
 def test_describe_tells_seconds_only_with_units():

@@ -77,8 +77,7 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
         if units := {name.removeprefix("units_"): given.pop(name) for name in UNITS & given.keys()}:
             given["units"] = units = tables.get("units", {}) | units
             if missing := [f"--units-{name.replace('_', '-')}" for name in Units.model_fields if name not in units]:
-                listed = " and ".join(filter(None, [", ".join(missing[:-1]), missing[-1]]))
-                raise ConfigError(f"units: all four or none; give {listed}, too")
+                raise ConfigError(f"units: all four or none; give {', '.join(missing)}, too")
         action(Given(tables, given), **extra)
 
     first = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
