@@ -15,8 +15,8 @@ from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_centres, lattice
 from alsph.symbols import Symbols
 
-#: Angle by which the lattice is turned against the axes of the flow.
 TURNED = np.arctan(2) / 2
+"""Angle by which the lattice is turned against the axes of the flow."""
 
 
 class EllipticalDrop(FreeSurface):

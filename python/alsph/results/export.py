@@ -178,14 +178,15 @@ class Grid(InUnits):
             dimensions=counts + [1] * more, spacing=spacing + [1.0] * more, origin=origin + [0.0] * more
         )
         for name, values in self.fields.items():
-            vector = vtkhdf.three_components(values) if values.ndim > len(counts) else values[..., None]
-            columns = [vector[..., k].ravel(order="F") for k in range(vector.shape[-1])]  # the first axis fastest
-            image.point_data[name] = np.stack(columns, axis=1).squeeze().astype(np.float32)
+            vector = vtkhdf.three_components(values) if values.ndim > len(counts) else values
+            table = vector.reshape(math.prod(counts), -1, order="F")  # the first axis fastest
+            image.point_data[name] = table.astype(np.float32)
         image.field_data["TimeValue"] = [self.time]
         writer = import_module("vtkmodules.vtkIOXML").vtkXMLImageDataWriter()
         writer.SetFileName(str(path))
         writer.SetInputData(image)
-        writer.Write()
+        if not writer.Write():
+            raise RunFolderError(f"{path}: cannot be written; is the disk full?")
 
     def _write_netcdf(self, path: Path) -> None:
         self.to_xarray().to_netcdf(path, engine="scipy")
