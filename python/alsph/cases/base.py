@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import itertools
 import math
 import re
 import warnings
@@ -112,10 +111,11 @@ class Case(Discretised):
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
         """Name a class that has no name of its own or its bases', and refuse parameters that nothing would ask for."""
         super().__pydantic_init_subclass__(**options)
-        for name, parent in itertools.product(cls.model_fields, cls.__mro__[1:]):
-            if isinstance(vars(parent).get(name), property | cached_property):
-                told = f"no parameter; make it a property, too, or `{name}: ClassVar[...] = ...`"
-                raise ConfigError(f"{cls.__name__}: '{name}' is a property of {parent.__name__}, {told}")
+        for parent in cls.__mro__[1:]:
+            for name in cls.model_fields.keys() & vars(parent).keys():
+                if isinstance(vars(parent)[name], property | cached_property):
+                    told = f"no parameter; make it a property, too, or `{name}: ClassVar[...] = ...`"
+                    raise ConfigError(f"{cls.__name__}: '{name}' is a property of {parent.__name__}, {told}")
         if not inspect.isabstract(cls):
             for name, of in (("name", name_of), ("title", title_of)):
                 if not hasattr(cls, name):
