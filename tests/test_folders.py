@@ -198,14 +198,25 @@ def test_no_figure_is_drawn_through_a_link(path, alsph, tmp_path, link):
 def test_figures_of_no_known_format_are_refused(path, tmp_path):
     with pytest.raises(ConfigError, match="'pgn' is no format of figures; did you mean 'png'?"):
         Run(path).plot_forces(tmp_path / "forces.pgn")
-    Run(path).plot_forces(tmp_path / "forces")
-    assert (tmp_path / "forces.png").stat().st_size > 1000
+    Run(path).plot_forces(tmp_path / "new" / "forces")
+    assert (tmp_path / "new" / "forces.png").stat().st_size > 1000
 
 
 def test_the_time_of_a_picture_is_said(path, alsph):
+    run = Run(path)
+    time = run.times[-1]
+    code, _, complaints = alsph("plot", path, "--field", "pressure", "--time", time + 0.3)
+    assert code == 0 and complaints == f"fields at t* = {time:.6g}, the output nearest to {time + 0.3:g}\n"
     code, _, complaints = alsph("plot", path, "--field", "pressure", "--time", 99)
-    time = Run(path).times[-1]
-    assert code == 0 and complaints == f"fields at t* = {time:.6g}, the output nearest to 99\n"
+    assert code == 2 and f"no snapshot near it, they are of t* = 0 to {time:.6g}" in complaints
+    for ask in (
+        run.snapshot,
+        run.to_grid,
+        lambda time: run.sample([[1, 0]], time),
+        lambda t: run.plot_field("pressure", t),
+    ):
+        with pytest.raises(ConfigError, match="time = -4: no snapshot near it"):
+            ask(-4)
 
 
 def test_a_file_that_expands_without_end_is_refused(path, alsph):

@@ -163,11 +163,13 @@ def test_a_write_that_fails_leaves_the_old_file(folder, monkeypatch):
 
 
 def test_existing_folders(tmp_path, folder):
-    with pytest.raises(RunFolderError, match="exists already; .*--force"):
+    with pytest.raises(RunFolderError, match="exists already; give another folder$"):
         folder.check_new(force=False)
     with pytest.raises(RunFolderError, match="not a run folder, so --force does not replace it"):
         folder.check_new(force=True)
     folder.write_info({"status": "finished"})
+    with pytest.raises(RunFolderError, match="exists already; give another folder, .*--force"):
+        folder.check_new(force=False)
     folder.check_new(force=True)
     (tmp_path / "file").write_text("")
     with pytest.raises(RunFolderError, match="not a folder that can be written to"):

@@ -40,8 +40,8 @@ def test_planes_are_given_by_a_place_or_by_two_corners():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ("q=1", "run.planes = 'q=1': must be an axis and where"),
-        ("z=0.5", "run.planes = 'z=0.5': must be an axis and where the plane cuts it, as in y=0.5"),
+        ("q=1", "run.planes = 'q=1': must be an axis, x, y, and where"),
+        ("z=0.5", "run.planes = 'z=0.5': must be an axis, x, y, and where the plane cuts it, as in y=0.5"),
         ("x=", "must be an axis"),
         ("x=nan", "must be an axis"),
         ("0,0", "must be an axis"),

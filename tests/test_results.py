@@ -138,7 +138,7 @@ def test_a_snapshot_that_was_cut_short_does_not_count(damaged):
         ("case.toml", None, "case.toml is missing; is this a run folder"),
         ("case.toml", b"resolution = ", "case.toml: unreadable"),
         ("case.toml", b"[project]\nname = 'other'\n", "resolution is missing"),
-        ("case.toml", b"resolution = -3\nreynolds = 1\n", "resolution is missing or not positive"),
+        ("case.toml", b"resolution = -3\nreynolds = 1\n", "resolution is missing, not positive or too large"),
         ("run.json", None, "run.json is missing"),
         ("run.json", b'{"status": ', "run.json: unreadable"),
         ("run.json", b"[]", "run.json: holds no table"),

@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 
+import alsph
 import numpy as np
 import pytest
 from alsph import Simulation
@@ -137,6 +138,10 @@ def test_numbers_and_arrays_are_asked_for_in_plain_words(small):
     simulation = small.simulation(1)
     for use, message in (
         (lambda: simulation.advance(1.5), "steps = 1.5: must be a whole number"),
+        (lambda: simulation.advance(-3), "steps = -3: must not be negative"),
+        (lambda: small.run("run", progress="no"), "progress = 'no': must be True or False"),
+        (lambda: alsph.open_run(3), "run = 3: must be the path of a run folder"),
+        (lambda: alsph.cases.find(7), "case = 7: must be the name of a case, or FILE.py:CLASS"),
         (lambda: simulation.run_until("late"), "time = 'late': must be a number"),
         (lambda: simulation.run_until(float("nan")), "time = nan: must be a number"),
         (lambda: next(simulation.steps(every="often")), "every = 'often': must be a number"),

@@ -24,7 +24,8 @@ from alsph import plotting, reference
 from alsph.tables import markdown
 from codes import ENVIRONMENTS, HERE, measure
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import LogLocator, NullFormatter
 
 ROWS = HERE / "curve.jsonl"
 PICTURE = HERE.parents[1] / "docs" / "images" / "cost_error.png"
@@ -100,7 +101,7 @@ def run(cases: list[str], most: float, folder: Path, sphinxsys: list[Path] | Non
 def plot(path: Path) -> None:
     """Draw the errors over the cost, a panel a case."""
     rows = read()
-    figure = Figure(figsize=(10, 3.6), layout="constrained")
+    figure = Figure(figsize=(10, 4), layout="constrained")
     for axes, (case, (_, _, resolutions, variants, title)) in zip(
         figure.subplots(1, len(CASES)), CASES.items(), strict=True
     ):
@@ -110,11 +111,22 @@ def plot(path: Path) -> None:
             cost, errors = [row["cpu_per_time"] for row in found], [100 * error(case, row) for row in found]
             axes.loglog(cost, errors, VARIANTS[variant][3], color=colour, ms=5, lw=1, label=VARIANTS[variant][0])
             for row, x, y in zip(found, cost, errors, strict=True):
-                axes.annotate(f"{row['resolution']}", (x, y), textcoords="offset points", xytext=(4, 4), fontsize=7)
+                axes.annotate(
+                    f"{row['resolution']}",
+                    (x, y),
+                    textcoords="offset points",
+                    xytext=(0, 5),
+                    fontsize=8,
+                    ha="center",
+                    color=colour,
+                    path_effects=[withStroke(linewidth=2, foreground="white")],
+                )
+        axes.margins(x=0.12, y=0.12)
         axes.set_title(title, fontsize=10)
         axes.set(xlabel="CPU s a unit of flow time, one core", ylabel="error [%]")
         axes.grid(alpha=0.3, which="both")
-        for axis in (axes.xaxis, axes.yaxis):
+        for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 100 * low else (1,)))
             axis.set_major_formatter("{x:g}")
             axis.set_minor_formatter(NullFormatter())
     handles, names = figure.axes[0].get_legend_handles_labels()

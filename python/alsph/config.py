@@ -345,4 +345,6 @@ def _tables(text: str) -> dict[str, Any]:
 
 def _reason(error: ValueError) -> str:
     """Return what the parser says; if it is Python that says it, a number has thousands of digits."""
-    return str(error) if isinstance(error, tomllib.TOMLDecodeError) else "a number in it has too many digits"
+    if not isinstance(error, tomllib.TOMLDecodeError):
+        return "a number in it has too many digits"
+    return f"{error}; texts stand in quotes" if "Invalid value" in str(error) else str(error)

@@ -101,7 +101,8 @@ class VectorExpression:
             raise ValueError(f"no expression{where}; write one such as 1 + 0.2*sin(2*pi*t), 0") from None
         parts = tree.body.elts if isinstance(tree.body, ast.Tuple) else [tree.body]
         if len(parts) != components:
-            raise ValueError(f"{len(parts)} components, and there are {components} directions; put commas between them")
+            apart = "; put commas between them" if len(parts) < components else ""
+            raise ValueError(f"{len(parts)} components, and there are {components} directions{apart}")
         try:
             for part in parts:
                 self._check(part)

@@ -15,6 +15,9 @@ from alsph.text import shown
 WHOLE, NUMBER = "must be a whole number", "must be a number"
 LONGEST_PATH = 300
 
+LARGEST = 1e15
+"""No parameter is as large."""
+
 WORDS = {
     "int_type": WHOLE,
     "int_from_float": WHOLE,
@@ -69,6 +72,12 @@ class Parameters(BaseModel):
         except OverflowError:  # in a validator
             sizes = {name: abs(value) for name, value in values.items() if isinstance(value, int | float)}
             raise ConfigError(f"{max(sizes, key=lambda name: sizes[name], default='a value')}: too large") from None
+        given = {name: getattr(self, name) for name in type(self).model_fields}
+        large = {
+            name: value for name, value in given.items() if isinstance(value, int | float) and abs(value) >= LARGEST
+        }
+        if large:
+            raise ConfigError(*(f"{name} = {value:g}: too large, {LARGEST:g} or more" for name, value in large.items()))
 
     def replace(self, **changes: Any) -> Self:
         """Return a set with some parameters changed: ``case.replace(reynolds=100)``."""

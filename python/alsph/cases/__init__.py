@@ -57,6 +57,7 @@ from alsph.cases.towed_cylinder import TowedCylinder
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain, SolidBody
 from alsph.parameters import suggest
+from alsph.text import shown
 
 CASES: dict[str, type[Case]] = {
     case.name: case
@@ -165,6 +166,8 @@ def find(name: str | dict[str, Any], *folders: Path) -> type[Case]:
     """
     if isinstance(name, dict):
         return source.Source.of(name).model()
+    if not isinstance(name, str):
+        raise ConfigError(f"case = {shown(name)}: must be the name of a case, or FILE.py:CLASS")
     if source.is_reference(name):
         model = source.read(name, *folders)
         if model.name in CASES:

@@ -35,7 +35,7 @@ def on_centre_lines(velocity: FloatArray) -> tuple[FloatArray, FloatArray]:
     return vertical[:, 0], horizontal[:, 1]
 
 
-SOURCE = "independent high-order solution (alsph/reference)"
+SOURCE = "independent high-order solution"
 
 
 class Cavity(Case):

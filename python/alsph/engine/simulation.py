@@ -170,6 +170,8 @@ class Simulation:
             If the computation breaks down.
         """
         steps = _whole("steps", steps)
+        if steps < 0:
+            raise ConfigError(f"steps = {steps}: must not be negative")
         with self._engine() as engine:
             first = engine.step
             for seconds in _slices(wall_seconds):

@@ -20,6 +20,7 @@ from alsph.folder.durable import viewing
 from alsph.geometry.particles import Snapshot
 from alsph.geometry.surface import Surface
 from alsph.memory import free_memory
+from alsph.parameters import LARGEST
 from alsph.text import contents
 
 LARGEST_EXPANSION = 1032
@@ -35,8 +36,6 @@ DAMAGE = (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeEr
 
 MOST_BYTES = 2**26
 """Of a text file that says what a run is."""
-
-LARGEST_NUMBER = 1e15
 
 SNAPSHOT_FIELDS = ("velocity", "pressure", "velocity_divergence", "vorticity", "kind")
 
@@ -58,8 +57,10 @@ def case(path: Path) -> dict[str, Any]:
     with _refusing(path, OSError, ValueError, RecursionError):
         content = tomllib.loads(contents(path, MOST_BYTES).decode("utf-8-sig"))
     for name in ("resolution", "reynolds"):
-        if not isinstance(content.get(name), (int, float)) or not 0 < content[name] < LARGEST_NUMBER:
-            raise RunFolderError(f"{path}: {name} is missing or not positive; is this a run folder of alsph?")
+        if not isinstance(content.get(name), (int, float)) or not 0 < content[name] < LARGEST:
+            raise RunFolderError(
+                f"{path}: {name} is missing, not positive or too large; is this a run folder of alsph?"
+            )
     return content
 
 
@@ -142,7 +143,7 @@ class History:
 
     def _added(self) -> bytes:
         """Return the whole lines that have not been read yet: all of them if it is another file than before."""
-        most = int(min(free_memory(), LARGEST_NUMBER)) // 10
+        most = int(min(free_memory(), LARGEST)) // 10
         with _refusing(self.path, OSError):
             text = contents(self.path, most, self._end - len(self._last))
             if not text.startswith(self._last):  # cut back or replaced

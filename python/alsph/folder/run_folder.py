@@ -93,10 +93,9 @@ class RunFolder:
         if self.path.exists():
             found = {entry.name for entry in self.path.iterdir()} if self.path.is_dir() else {self.path.name}
             if found - {LOCK} and not force:
-                raise RunFolderError(
-                    f"{self.path}: exists already; give another folder, `alsph resume` it, or use --force "
-                    "(in Python force=True)"
-                )
+                ways = ", `alsph resume` it, or use --force (in Python force=True)"
+                is_run = self._is_replaceable(configuration)
+                raise RunFolderError(f"{self.path}: exists already; give another folder{ways if is_run else ''}")
             if found - {LOCK} and not self._is_replaceable(configuration):
                 raise RunFolderError(
                     f"{self.path}: not a run folder, so --force does not replace it, without its "

@@ -47,7 +47,8 @@ class Plane:
         if not np.isfinite(place):
             last = AXES[len(middle) - 1]
             raise ConfigError(
-                f"{setting} = {shown(given)}: must be an axis and where the plane cuts it, as in {last}=0.5 [D]"
+                f"{setting} = {shown(given)}: must be an axis, {', '.join(AXES[: len(middle)])}, and where the plane "
+                f"cuts it, as in {last}=0.5 [D]"
             )
         return cls(axis, place)
 

@@ -5,7 +5,7 @@ from alsph.plotting.curves import Curve, convergence, gauges, panels, pressure_c
 from alsph.plotting.histories import coefficients, forces, ledger, spectrum
 from alsph.plotting.pictures import FIELDS, extent_of, field, field_style, fields
 from alsph.plotting.setup import start
-from alsph.plotting.style import PALETTE, head, remark, rename, save
+from alsph.plotting.style import PALETTE, head, remark, rename, save, title
 
 __all__ = [
     "FIELDS",
@@ -32,4 +32,5 @@ __all__ = [
     "save",
     "spectrum",
     "start",
+    "title",
 ]

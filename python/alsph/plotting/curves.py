@@ -245,9 +245,14 @@ def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str
                 axes.xaxis.set_minor_formatter("{x:g}")
         axes.set(xlabel=label, ylabel=name)
         axes.grid(alpha=0.3)
-        axes.legend(fontsize="small")
     for axes in list(figure.axes)[len(panels) :]:
         axes.remove()
+    named = {
+        text: handle for axes in figure.axes for handle, text in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(
+        [*named.values()], [*named], loc="outside lower center", ncols=2 * columns, fontsize="small", frameon=False
+    )
     return figure
 
 

@@ -39,6 +39,8 @@ INSIDE = 0.75  # share of the space around that fluid fills, above which it is n
 
 AIR = "0.88"  # colour beside a free surface: spray without pressure is white
 
+ROOM = 0.1  # of a picture's longer side, that is left beside a free surface
+
 LARGEST_VIEW = 20_000  # spacings that a picture is wide or high at most
 
 
@@ -253,7 +255,7 @@ def meets_air(snapshot: Snapshot) -> bool:
 def extent_of(
     snapshot: Snapshot, spacing: float, view: Sequence[float] | None = None, plane: Plane | None = None
 ) -> tuple[float, float, float, float]:
-    """Return left, right, bottom and top of the view; without one, of the fluid without inlet and outlet buffers."""
+    """Return left, right, bottom and top of the view; without one, of the fluid without buffers, with some air."""
     if plane is None and snapshot.position.shape[1] != 2:
         raise ConfigError("pictures of several runs are drawn in 2-D only; open particles.vtkhdf in ParaView")
     if view is not None:
@@ -264,8 +266,14 @@ def extent_of(
         if not (0 < right - left < LARGEST_VIEW * spacing and 0 < top - bottom < LARGEST_VIEW * spacing):
             raise ConfigError(f"view = {shown(view)}: needs left, right, bottom and top, in this order [D]")
         return left, right, bottom, top
-    position = snapshot.position[snapshot.kind == Kind.FLUID][:, plane.across if plane else [0, 1]]
+    axes = plane.across if plane else [0, 1]
+    position = snapshot.position[snapshot.kind == Kind.FLUID][:, axes]
     bounds = np.array([position.min(axis=0) - spacing / 2, position.max(axis=0) + spacing / 2])
+    if snapshot.domain is not None and meets_air(snapshot):
+        room = ROOM * np.ptp(bounds, axis=0).max()
+        sides = np.array([snapshot.domain.lower, snapshot.domain.upper])[:, axes]
+        bounds[0] = np.minimum(bounds[0], np.maximum(bounds[0] - room, sides[0]))
+        bounds[1] = np.maximum(bounds[1], np.minimum(bounds[1] + room, sides[1]))
     (left, bottom), (right, top) = np.round(bounds / spacing) * spacing
     return float(left), float(right), float(bottom), float(top)
 

@@ -13,7 +13,7 @@ from alsph.arrays import AXES, Arrays, FloatArray
 from alsph.cases import Bodies, Case, remarks
 from alsph.geometry.particles import Kind, particles
 from alsph.geometry.plane import Plane
-from alsph.plotting.style import PALETTE, blank, rename
+from alsph.plotting.style import PALETTE, blank, rename, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -142,7 +142,7 @@ def start(case: Case, state: Arrays | None = None, points: FloatArray | None = N
         plane, where = (cut.across[0], cut.across[1]), f", ${AXES[cut.axis]}/D$ = {cut.place:.3g}"
     figure = _draw_all(
         _found(case, state or _particles(case), points, plane),
-        f"{case.name}, Re = {case.reynolds:g}, D/Δx = {case.resolution}{where}",
+        f"{title([case.model_dump() | {'case': case.name}])}{where}",
     )
     rename(figure, case.symbols)
     return figure
@@ -228,7 +228,7 @@ def _thinnest(case: Bodies) -> tuple[FloatArray, str] | None:
     return np.array(there) + case.centre, f"thinnest part: {name}"
 
 
-def _draw_all(found: Setup, title: str) -> Figure:
+def _draw_all(found: Setup, of: str) -> Figure:
     """Draw all of it, the bodies and their thinnest part."""
     views = [("", found.view)]
     if found.bodies:
@@ -249,7 +249,7 @@ def _draw_all(found: Setup, title: str) -> Figure:
     for place, (name, view) in zip(places, views, strict=True):
         axes = figure.add_subplot(place)
         _draw(axes, found, view, close=name != "")
-        axes.set_title(name or title, fontsize="medium")
+        axes.set_title(name or of, fontsize="medium")
     _explain(figure, found)
     return figure
 

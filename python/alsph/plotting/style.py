@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,6 +13,7 @@ from alsph.errors import ConfigError
 from alsph.folder.durable import check_target, replacing
 from alsph.parameters import suggest
 from alsph.symbols import GENERAL, Symbols
+from alsph.text import in_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,7 +62,7 @@ def blank(width: float, height: float, layout: Literal["constrained", "compresse
 
 
 def save(figure: Figure, path: str | Path, **options: Any) -> None:
-    """Save a figure in a file; what was there is replaced, and nothing is written through a link.
+    """Save a figure in a file, whose folder is made; what was there is replaced, nothing is written through a link.
 
     Parameters
     ----------
@@ -82,9 +84,20 @@ def save(figure: Figure, path: str | Path, **options: Any) -> None:
     known = figure.canvas.get_supported_filetypes()
     if (kind := path.suffix[1:].lower()) not in known:
         raise ConfigError(f"{path}: '{kind}' is no format of figures; {suggest(kind, known)}")
+    path.parent.mkdir(parents=True, exist_ok=True)
     check_target(path)
     with replacing(path) as temporary:
         figure.savefig(temporary, format=kind, **options)
+
+
+def title(flows: Sequence[Mapping[str, Any]]) -> str:
+    """Return what pictures are of, from the parameters of each flow: ``case``, ``reynolds``, ``resolution``."""
+    parts = [in_figure(", ".join(dict.fromkeys(str(flow.get("case")) for flow in flows)).replace("_", " "))]
+    for symbol, name in (("Re", "reynolds"), (r"$D/\Delta x$", "resolution")):
+        known = sorted({value for flow in flows if isinstance(value := flow.get(name), int | float)})
+        if known:
+            parts.append(f"{symbol} = {', '.join(f'{value:g}' for value in known)}")
+    return ", ".join(parts)
 
 
 def head(figure: Figure, title: str) -> None:

@@ -420,4 +420,4 @@ def _library(name: str, extra: str = "tables") -> Any:
     try:
         return import_module(name)
     except ImportError:
-        raise ConfigError(f"this needs {name}: pip install {name}, or 'alsph[{extra}]'") from None
+        raise ConfigError(f"this needs {name}: pip install 'alsph[{extra}]'") from None

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     import pyvista
     import xarray
 
+FARTHEST = 0.5
+"""How far from a snapshot a time may lie that is asked for [D/U], if snapshots are not farther apart."""
+
 
 class Fields:
     """The part of :class:`alsph.Run` that reads history, particles, probes and planes."""
@@ -73,7 +76,7 @@ class Fields:
         Raises
         ------
         ConfigError
-            If the time is no finite number.
+            If the time is no finite number, or farther from all snapshots than they are from each other.
         RunFolderError
             If there is no complete snapshot.
         """
@@ -82,6 +85,9 @@ class Fields:
         if len(self.times) == 0:
             raise RunFolderError(f"{self.path}: no snapshot yet; wait for the first one or lower output_interval")
         index = len(self.times) - 1 if time is None else int(np.abs(self.times - time).argmin())
+        if time is not None and abs(self.times[index] - time) > np.diff(self.times).max(initial=FARTHEST):
+            first, last = self.times[[0, -1]]
+            raise ConfigError(f"time = {time:g}: no snapshot near it, they are of t* = {first:.6g} to {last:.6g}")
         found = reading.snapshot(self.path / "particles.vtkhdf", index)
         with suppress(RunFolderError):  # of a case that is not known the particles can be read all the same
             return replace(found, domain=self.config.case.checked_domain, solid=self._solid_height(found.time))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import shlex
 from collections.abc import Callable
 from functools import cached_property
@@ -63,9 +64,12 @@ class Run(Loads):
     """
 
     def __init__(self, path: str | Path) -> None:
+        if not isinstance(path, str | os.PathLike):
+            raise ConfigError(f"run = {shown(path)}: must be the path of a run folder")
         self.path = Path(path)
         if not self.path.is_dir():
-            raise RunFolderError(f"{self.path}: no such run folder")
+            there = "a file, and no run folder" if self.path.exists() else "no such run folder"
+            raise RunFolderError(f"{self.path}: {there}")
         self.case: dict[str, Any] = reading.case(self.path / "case.toml")
         self.info: dict[str, Any] = reading.info(self.path / "run.json")
         if self._goes_on() and RunFolder(self.path).is_busy() is False:
@@ -405,10 +409,8 @@ class Run(Loads):
     @property
     def _title(self) -> str:
         """What its pictures are of."""
-        case = self.info.get("case") or shown_name(self.case.get("case"))
-        known = (("Re", self.case.get("reynolds")), (r"$D/\Delta x$", self.case.get("resolution")))
-        numbers = [f"{name} = {value:g}" for name, value in known if isinstance(value, int | float)]
-        return ", ".join([in_figure(str(case).replace("_", " ")), *numbers])
+        name = self.info.get("case") or shown_name(self.case.get("case"))
+        return str(_plotting().title([self.case | {"case": name}]))
 
     def _said(self) -> str:
         """Return what stands below its figures: the run's remarks in short, and what their units are in SI."""

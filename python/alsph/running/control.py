@@ -39,7 +39,9 @@ class Control:
     deadline: float = field(init=False)
 
     def __post_init__(self) -> None:
-        """Refuse numbers without sense."""
+        """Refuse what makes no sense."""
+        if not isinstance(self.progress, bool):
+            raise ConfigError(f"progress = {shown(self.progress)}: must be True or False")
         if not (isinstance(self.walltime, int | float | np.number) and self.walltime > 0):
             raise ConfigError(f"walltime = {shown(self.walltime)}: must be a number above zero [s]")
         if not (isinstance(self.retry, int) and self.retry >= 0):

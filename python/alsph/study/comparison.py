@@ -162,7 +162,9 @@ class Comparison:
             for profile in run.profiles:
                 profiles.setdefault(profile.file_name, {})[name] = profile
         pictures |= {file: plotting.profile(curves) for file, curves in profiles.items() if len(curves) > 1}
+        title = plotting.title([run.case | {"case": run.config.case.name} for run in begun.values()])
         for picture in pictures.values():
+            plotting.head(picture, title)
             plotting.remark(picture, tally([keywords(run.remarks) for run in self.runs.values()]))
             plotting.rename(picture, self.symbols)
         return pictures
@@ -227,7 +229,7 @@ def _parameters(run: Run) -> dict[str, str]:
 
 def _parameter(value: Any) -> str:
     if value is None:
-        return "automatic"
+        return "not given"
     if isinstance(value, Shape):
         return f"{value}{_sum(value.sha256)}"
     return text(value) if isinstance(value, int | float) else shown(value if isinstance(value, list) else str(value))

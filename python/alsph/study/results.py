@@ -240,10 +240,16 @@ class Results:
         pictures = {}
         for figure in self.study.figures:
             if picture := draw[figure.kind](figure):
+                plotting.head(picture, self._title(figure))
                 plotting.remark(picture, tally([self.rows[k].get("remarks", "") for k in self._chosen(figure)]))
                 plotting.rename(picture, self.symbols)
                 pictures[figure.name] = picture
         return pictures
+
+    def _title(self, figure: Figure) -> str:
+        cases = [point.config.case for point in self.study.points()]
+        chosen = [cases[index] for index in self._chosen(figure)]
+        return plotting.title([case.model_dump() | {"case": case.name} for case in chosen])
 
     def _chosen(self, figure: Figure) -> list[int]:
         """Return the finished runs that a figure shows."""
@@ -262,7 +268,7 @@ class Results:
         for name in self.study.swept:
             if name != without and name in row and name in self.study.varied:
                 parts.append(_LEGEND.get(name, "{name} {value}").format(name=name, value=in_figure(text(row[name]))))
-        return " ".join(parts)
+        return ", ".join(parts)
 
     def _curves(self, figure: Figure) -> Picture | None:
         chosen = self._chosen(figure)
@@ -281,7 +287,7 @@ class Results:
             if early:
                 curves.append(Curve(DEVELOPING, *_sorted(early)[:2], style="x", colour="k"))
             if known:
-                curves.append(Curve("reference", *_sorted(list(known.items())), style="--", colour="k"))
+                curves.append(Curve("reference", *_sorted(list(known.items())), style="d--", colour="k"))
             curves += [
                 Curve(other.label, [other.parameters[figure.x]], [other.values[y]], style=marker, colour="k")
                 for other, marker in zip(self.study.published, _MARKERS, strict=False)
@@ -314,12 +320,12 @@ class Results:
 
 _LEGEND = {
     "resolution": "$D/\\Delta x$ = {value}",
-    "algorithm": "({value})",
+    "algorithm": "Algorithm {value}",
     "reynolds": "Re = {value}",
     "time_step": "$\\Delta tU/\\Delta x$ = {value}",
     "max_iterations": "{value} iterations",
 }
-_MARKERS = "*+1234d"
+_MARKERS = "*+1234|"
 SNAPSHOTS_AT_LIFT = 10
 
 
