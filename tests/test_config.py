@@ -80,7 +80,7 @@ def test_unreadable_file(tmp_path):
         ({"reynolds": np.arange(2.0)}, ["reynolds = array([0., 1.]): must be a number ("]),
         ({"reynolds": 10**400}, ["0000 ...: must be a smaller number ("]),
         ({"resolution": 10**400}, ["resolution: too large"]),
-        ({"reynolds": 1e15, "perturbation": 2e15}, ["reynolds = 1e+15: too large", "perturbation = 2e+15: too"]),
+        ({"reynolds": 1e15}, ["reynolds = 1e+15: too large"]),
         ({"length": 1e308, "upstream": 4.0}, ["length: too large"]),
         ({"kernel": 3}, ["kernel = 3: must be 'quintic_spline', 'wendland_c2' or"]),
         ({"adaptive_time_step": "yes"}, ["adaptive_time_step = 'yes': must be true or false ("]),
