@@ -21,6 +21,7 @@ SINGULAR = 1e-5  # directions that the neighbours determine less well than this 
 CHUNK = 50_000  # points that fields are interpolated to at a time
 REACH = 4.0  # Δx beyond a periodic side that particles are continued to, farther than fits reach
 VOID = 1.5  # points further than this many Δx from every particle have no value
+FILL_WIDTH = 0.7  # of the Gaussian by which the share of space is told that particles fill [Δx]
 
 
 def _nearest(
@@ -47,9 +48,27 @@ def average(position: FloatArray, values: FloatArray, points: FloatArray, spacin
 def fill(position: FloatArray, points: FloatArray, spacing: float) -> FloatArray:
     """Share (m,) of the space at points (m, d) that particles fill: 1 inside a body, 1/2 on its surface, 0 far off."""
     distance, _ = _nearest(position, points)
-    width = 0.7 * spacing
+    width = FILL_WIDTH * spacing
     kernel = np.exp(-0.5 * (distance / width) ** 2) / (np.sqrt(2 * np.pi) * width) ** points.shape[1]
     return np.asarray(spacing ** points.shape[1] * kernel.sum(axis=1))
+
+
+def room(points: FloatArray, domain: Domain, spacing: float) -> FloatArray:
+    """Share (m,) of the space at points (m, d), as of :func:`fill`, that lies in a domain, which is open to the air."""
+    from scipy.special import ndtr  # slow to load, and most pictures do without
+
+    share = np.ones(len(points))
+    for axis, sides in enumerate(domain.boundaries):
+        heights = points[:, axis] - domain.lower[axis], domain.upper[axis] - points[:, axis]
+        for side, height in zip(sides, heights, strict=True):
+            if side == "slip":
+                share *= ndtr(height / (FILL_WIDTH * spacing))
+    return share
+
+
+def distance(position: FloatArray, points: FloatArray) -> FloatArray:
+    """Distances (m,) of points (m, d) from the nearest particle."""
+    return np.asarray(neighbour_tree(position).query(points)[0])
 
 
 def in_solid(position: FloatArray, fluid: NDArray[np.bool_], points: FloatArray) -> NDArray[np.bool_]:

@@ -37,6 +37,8 @@ TALLEST = 1.5  # height over width, beyond which the picture is made narrower th
 
 INSIDE = 0.75  # share of the space around that fluid fills, above which it is neither at a free surface nor spray
 
+DROP = 0.54  # times √d: radius of a particle in the air, how far fluid reaches beyond its outermost particles [Δx]
+
 AIR = "0.88"  # colour beside a free surface: spray without pressure is white
 
 ROOM = 0.1  # of a picture's longer side, that is left beside a free surface
@@ -293,12 +295,17 @@ def _raster(
     fluid, values = snapshot.position[snapshot.fluid], _values(snapshot, name, whole, spacing)
     if whole.domain is not None:
         fluid, values = sampling.with_images(fluid, values, whole.domain, sampling.REACH * spacing)
-    picture = sampling.average(fluid, values, points, spacing).reshape(shape)
+    picture = sampling.average(fluid, values, points, spacing)
     scaled = np.isfinite(picture)
-    if meets_air(whole):
-        full = sampling.fill(fluid, points, spacing).reshape(shape) > INSIDE
-        scaled = scaled & full if (scaled & full).any() else scaled
-    return picture, scaled
+    if whole.domain is not None and meets_air(whole):
+        # Solids, too, fill what is beside a surface.
+        around, _ = sampling.with_images(whole.position, whole.pressure, whole.domain, sampling.REACH * spacing)
+        filled = sampling.fill(around, points, spacing)
+        scaled = scaled & full if (scaled & (full := filled > INSIDE)).any() else scaled
+        radius = DROP * np.sqrt(points.shape[1]) * spacing
+        free = filled < 0.5 * sampling.room(points, whole.domain, spacing)
+        picture[free & (sampling.distance(around, points) > radius)] = np.nan
+    return picture.reshape(shape), scaled.reshape(shape)
 
 
 def _solid(
