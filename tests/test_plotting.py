@@ -12,6 +12,7 @@ from alsph.errors import ConfigError
 from alsph.folder.run_folder import RunFolder
 from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Kind, Snapshot
+from alsph.geometry.plane import Plane
 from alsph.plotting.curves import Curve
 from alsph.plotting.pictures import _limit
 from alsph.plotting.style import line
@@ -52,6 +53,30 @@ def test_a_picture_shows_the_field_and_the_body_where_they_are(run):
     outline = np.concatenate([path.vertices for path in axes.collections[0].get_paths()])
     radius = np.hypot(*(outline[np.abs(outline).sum(axis=1) > 0] - [4.0, 0.0]).T)
     assert radius == pytest.approx(0.5, abs=0.02)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_fluid_in_air_ends_where_it_does(dimensions):
+    sides = [np.arange(0.05, 1, 0.1)] * dimensions
+    water = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, dimensions)
+    position = np.concatenate([water, [[0.45] * (dimensions - 1) + [1.45]]])
+    n = len(position)
+    walls = [("slip", "slip")] * (dimensions - 1) + [("slip", "air")]
+    domain = Domain([0] * dimensions, [1] * (dimensions - 1) + [3], walls)
+    vorticity = np.zeros((n, 3) if dimensions == 3 else n)
+    nothing = np.zeros((n, dimensions)), np.ones(n), np.zeros(n), vorticity, np.zeros(n, np.uint8)
+    snapshot = replace(Snapshot(0.0, position, *nothing), domain=domain)
+    plane = Plane(1, 0.5) if dimensions == 3 else None
+    axes = plotting.field(snapshot, "pressure", 0.1, plane=plane).axes[0]
+    assert axes.get_xlim() == pytest.approx((0, 1)) and axes.get_ylim() == pytest.approx((0, 1.6))
+    drawn = np.isfinite(np.ma.filled(axes.images[0].get_array(), np.nan))
+    height = (np.arange(len(drawn)) + 0.5) * 1.6 / len(drawn)
+    assert (
+        drawn[height < 0.98].all()
+        and not drawn[(height > 1.1) & (height < 1.3)].any()
+        and not drawn[height > 1.55].any()
+    )
+    assert 0.005 < drawn[height > 1.3].mean() * 0.3 < 0.04  # a drop of 0.01
 
 
 def test_a_picture_of_fluid_without_a_body_and_without_variation():
