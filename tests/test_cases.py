@@ -188,7 +188,7 @@ def test_too_much_memory_is_refused_before_it_is_taken():
 
 
 def test_exact_taylor_green_solves_the_euler_equation():
-    case = TaylorGreen(reynolds=1e30)
+    case = TaylorGreen(reynolds=1e14)
     points, offset = np.random.default_rng(1).random((50, 2)), 1e-5
 
     def derivative(name, axis):

@@ -413,7 +413,7 @@ def test_studies_and_comparisons_take_runs_that_converge(tmp_path, small, ends_a
     one = package.Run(tmp_path / "studies" / found.rows[1]["folder"])
     assert one.info["start"]["initial_run"] == str(first.path)
     told = package.compare([first, one]).parameters
-    assert told["run.until"] == ["0.3", "'converged'"] and told["run.latest"] == ["automatic", "0.2"]
+    assert told["run.until"] == ["0.3", "'converged'"] and told["run.latest"] == ["not given", "0.2"]
     wrong = Study(name="few", base=base, sweep=Sweep(sets=[{"case": "taylor_green"}]))
     with pytest.raises(ConfigError):
         wrong.points()

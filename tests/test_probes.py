@@ -252,7 +252,7 @@ def test_what_is_no_grid_is_refused(vortices, options, message):
 
 def test_a_library_that_is_not_there_is_told(vortices, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ConfigError, match="this needs pandas: pip install pandas"):
+    with pytest.raises(ConfigError, match="this needs pandas: pip install 'alsph"):
         vortices.to_pandas()
 
 

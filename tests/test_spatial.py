@@ -234,7 +234,7 @@ def test_pictures_show_a_plane(tmp_path):
     image = run.plot_field("pressure", plane="y").axes[0].images[0].get_array()
     assert image.shape == (32, 40) and np.isnan(image.astype(float)).mean() < 0.15
     for wrong, words in (
-        ("q=1", "an axis and where"),
+        ("q=1", "an axis, x, y, z, and where"),
         ("z=inf", "an axis"),
         ("", "an axis"),
         ("z=9", "no fluid there"),

@@ -78,9 +78,7 @@ def _watch(
     path: RunPath,
     port: Annotated[
         int | None,
-        typer.Option(
-            metavar="N", min=0, max=65535, help="port of the page", show_default="the first free from 8000 on"
-        ),
+        typer.Option(metavar="N", help="port of the page", show_default="the first free from 8000 on"),
     ] = None,
     browser: Annotated[bool, typer.Option(help="open the page, where there is a screen")] = True,
 ) -> None:
