@@ -296,15 +296,15 @@ def _raster(
     if whole.domain is not None:
         fluid, values = sampling.with_images(fluid, values, whole.domain, sampling.REACH * spacing)
     picture = sampling.average(fluid, values, points, spacing)
-    scaled = np.isfinite(picture)
-    if whole.domain is not None and meets_air(whole):
-        # Solids, too, fill what is beside a surface.
-        around, _ = sampling.with_images(whole.position, whole.pressure, whole.domain, sampling.REACH * spacing)
-        filled = sampling.fill(around, points, spacing)
-        scaled = scaled & full if (scaled & (full := filled > INSIDE)).any() else scaled
-        radius = DROP * np.sqrt(points.shape[1]) * spacing
-        free = filled < 0.5 * sampling.room(points, whole.domain, spacing)
-        picture[free & (sampling.distance(around, points) > radius)] = np.nan
+    if whole.domain is None or not meets_air(whole):
+        return picture.reshape(shape), np.isfinite(picture).reshape(shape)
+    # Solids, too, fill what is beside a surface.
+    around, _ = sampling.with_images(whole.position, whole.pressure, whole.domain, sampling.REACH * spacing)
+    filled, radius = sampling.fill(around, points, spacing), DROP * np.sqrt(points.shape[1]) * spacing
+    free = filled < 0.5 * sampling.room(points, whole.domain, spacing)
+    picture[free & (sampling.distance(around, points) > radius)] = np.nan
+    scaled, full = np.isfinite(picture), filled > INSIDE
+    scaled = scaled & full if (scaled & full).any() else scaled
     return picture.reshape(shape), scaled.reshape(shape)
 
 
