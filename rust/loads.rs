@@ -4,8 +4,6 @@
 //! gradient of (the scheme's acting pressure), and the viscous stress through the compact Laplacian of the same pairs. Both
 //! are antisymmetric, so the solid's own pairs cancel and only fluid neighbours count. Their sum is the momentum that the fluid gives.
 //! Beside a free surface all that the step's terms give to the fluid counts with the pressure, and what solids hold that comes too near.
-//! A viscous pair's force is not along the line between the two, and acts in the middle: at the solid's place its torque would be off by first
-//! order where the surface is curved.
 //! The viscous pairs feel the slope of the velocity over the width of a kernel. Where
 //! the velocity's slope at the surface is known, the viscous part is its shear over the area of the surface, and the pressure part the rest.
 
@@ -47,10 +45,22 @@ impl<const D: usize> Default for Load<D> {
 type Sums = [ExactSum; 13];
 
 impl<const D: usize> Load<D> {
+    /// That of a pressure force that acts at `arm`, and a viscous force that acts at `surface`, whose velocity along itself is `sliding`.
+    fn new(arm: &Vector<D>, pressure: Vector<D>, surface: &Vector<D>, viscous: Vector<D>, sliding: &Vector<D>) -> Self {
+        Self {
+            pressure_force: pressure,
+            viscous_force: viscous,
+            pressure_torque: cross(arm, &pressure),
+            viscous_torque: cross(surface, &viscous),
+            sliding_power: -(pressure + viscous).dot(sliding),
+        }
+    }
+
     /// Force and torque.
     pub fn total(&self) -> [nalgebra::Vector3<f64>; 2] {
-        let force = sum(components(&self.pressure_force), components(&self.viscous_force));
-        [force, sum(self.pressure_torque, self.viscous_torque)].map(nalgebra::Vector3::from)
+        let add = |a: [f64; 3], b: [f64; 3]| nalgebra::Vector3::from(a) + nalgebra::Vector3::from(b);
+        let force = add(components(&self.pressure_force), components(&self.viscous_force));
+        [force, add(self.pressure_torque, self.viscous_torque)]
     }
 
     fn add_to(&self, sums: &mut Sums) {
@@ -86,9 +96,12 @@ pub fn loads<const D: usize>(
     let add = |sums: &mut Vec<Sums>, s: usize| {
         if particles.kind[s] == ParticleKind::Solid {
             sums.resize_with(centers.len(), Sums::default);
+            let (pressure, viscous) = force_on(settings, particles, frame, walls, pressure(s), s);
             let body = particles.body[s] as usize;
             let arm = motion.arm(body, particles.position[s] - centers[body]);
-            load_on(settings, particles, frame, walls, pressure(s), (s, arm)).add_to(&mut sums[body]);
+            let (normal, velocity) = (&particles.normal[s], &particles.velocity[s]);
+            let (surface, sliding) = (arm + normal * particles.depth[s], velocity - normal * velocity.dot(normal));
+            Load::new(&arm, pressure, &surface, viscous, &sliding).add_to(&mut sums[body]);
         }
     };
     // Most chunks hold no solid and give an empty vector.
@@ -115,50 +128,37 @@ pub fn force_of_pressure<const D: usize>(stencil: &Stencil<D>, acting: impl Fn(u
     pairs(stencil, s, |f, r_sf| -r_sf * (acting(s) + acting(f)))
 }
 
-/// The load on solid particle `s`, which is at `arm` from where its torque is taken about, of the force `pressure` and of the fluid's viscosity.
-fn load_on<const D: usize>(
+/// Pressure and viscous force on solid particle `s`.
+fn force_on<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
     frame: &Frame<D>,
     walls: &Walls<D>,
-    pressure: Vector<D>,
-    (s, arm): (usize, Vector<D>),
-) -> Load<D> {
+    mut pressure: Vector<D>,
+    s: usize,
+) -> (Vector<D>, Vector<D>) {
     let stencil = &frame.stencil;
     let viscosity = settings.density * settings.kinematic_viscosity;
-    let (mut viscous, mut twist) = (Vector::zeros(), [0.0; 3]);
+    let mut viscous = Vector::zeros();
     let (row, lane) = stencil.neighbours.row(s);
     for entry in row.flowing() {
         let f = entry.j();
+        let slope = entry.slope(lane);
         let dispersion = |i: usize| walls.dispersion.get(i).copied().unwrap_or_else(Vector::zeros);
         let relative = (particles.velocity[f] - dispersion(f)) - (walls.seen_by(particles, s, f) - dispersion(s));
-        let force = relative * (-entry.slope(lane) * 2.0 * viscosity);
-        viscous += force;
-        twist = sum(twist, cross(&(arm + (stencil.position[f] - stencil.position[s]) / 2.0), &force));
+        viscous += relative * (-slope * 2.0 * viscosity);
     }
     viscous *= stencil.volume[s];
-    twist = twist.map(|component| component * stencil.volume[s]);
-    let (normal, velocity) = (&particles.normal[s], &particles.velocity[s]);
-    let mut load = Load {
-        pressure_force: pressure,
-        viscous_force: viscous,
-        pressure_torque: cross(&arm, &pressure),
-        viscous_torque: twist,
-        sliding_power: 0.0,
-    };
     if let Some(&Some(slope)) = walls.slope.get(s) {
+        let normal = &particles.normal[s];
         // Without divergence the normal velocity has no slope at a wall; that of the fit is no stress.
         let along = slope - normal * slope.dot(normal);
         let factor = viscosity * surface_area(settings, particles, stencil, s);
-        let turning = if factor > 0.0 { turning(settings, particles, frame, s) * factor } else { Vector::zeros() };
-        let (shear, surface) = (along * factor, arm + normal * particles.depth[s]);
-        load.pressure_force += viscous - shear;
-        load.viscous_force = shear + turning;
-        load.pressure_torque = sum(load.pressure_torque, sum(twist, cross(&surface, &-shear)));
-        load.viscous_torque = cross(&surface, &load.viscous_force);
+        let turning = if factor > 0.0 { turning(settings, particles, frame, s) } else { Vector::zeros() };
+        let shear = along * factor;
+        (pressure, viscous) = (pressure + viscous - shear, shear + turning * factor);
     }
-    load.sliding_power = -(load.pressure_force + load.viscous_force).dot(&(velocity - normal * velocity.dot(normal)));
-    load
+    (pressure, viscous)
 }
 
 /// (∇u)ᵀ n of the surface above solid particle `s`, along it: what the stress has beside the slope where the surface turns, −u/R on a cylinder
@@ -190,8 +190,4 @@ fn components<const D: usize>(v: &Vector<D>) -> [f64; 3] {
 pub fn cross<const D: usize>(a: &Vector<D>, b: &Vector<D>) -> [f64; 3] {
     let [a, b] = [a, b].map(|v| nalgebra::Vector3::from(components(v)));
     a.cross(&b).into()
-}
-
-fn sum(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|k| a[k] + b[k])
 }
