@@ -1,5 +1,18 @@
 """Augmented Lagrangian SPH: incompressible flow with particles, without a pressure Poisson solve.
 
+A case is its parameters, a run of it is a folder, and what is read from that is a ``Run``:
+
+======================================================  =====================================================
+``cases``                                               the flows, ``cases.Cylinder(...).run(folder)``
+``open_run``, ``resume``, ``repeat``, ``watch``         a folder's run: its results, more of it, again, live
+``compare``, ``compare_schemes``, ``converge``          runs beside each other, schemes, resolutions
+``study``, ``validate``, ``autotune``                   many runs, references, the largest step
+``Simulation``, ``Domain``, ``SolidBody``, ``Rigid``    the engine itself, step by step
+``Units``, ``errors``                                   SI units, what is raised
+======================================================  =====================================================
+
+The other modules are what these are made of. On the command line: ``alsph --help``.
+
 Examples
 --------
 >>> import alsph

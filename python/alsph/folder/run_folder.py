@@ -92,15 +92,16 @@ class RunFolder:
         """Check, without touching anything, that the folder can be created (or, with `force`, replaced)."""
         if self.path.exists():
             found = {entry.name for entry in self.path.iterdir()} if self.path.is_dir() else {self.path.name}
-            if found - {LOCK} and not force:
-                ways = ", `alsph resume` it, or use --force (in Python force=True)"
+            if found - {LOCK}:
                 is_run = self._is_replaceable(configuration)
-                raise RunFolderError(f"{self.path}: exists already; give another folder{ways if is_run else ''}")
-            if found - {LOCK} and not self._is_replaceable(configuration):
-                raise RunFolderError(
-                    f"{self.path}: not a run folder, so --force does not replace it, without its "
-                    f"{' and '.join(MARKS)}; give another folder"
-                )
+                if not force:
+                    ways = ", `alsph resume` it, or use --force (in Python force=True)" if is_run else ""
+                    raise RunFolderError(f"{self.path}: exists already; give another folder{ways}")
+                if not is_run:
+                    raise RunFolderError(
+                        f"{self.path}: not a run folder, so --force does not replace it, without its "
+                        f"{' and '.join(MARKS)}; give another folder"
+                    )
         parent = next(parent for parent in self.path.absolute().parents if parent.exists())
         if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
             raise RunFolderError(f"{self.path}: cannot be created, {parent} is not a folder that can be written to")

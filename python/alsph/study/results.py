@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,8 @@ from alsph.text import in_figure, printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Picture
+
+    from alsph.cases import Case
 
 DIVERGENCE = "mean velocity divergence, |∇·u| D/U"
 OF_ALL_RUNS = (
@@ -232,7 +235,11 @@ class Results:
     @property
     def symbols(self) -> Symbols:
         """What the cases call D and U, if all call them the same."""
-        return in_common(point.config.case.symbols for point in self.study.points())
+        return in_common(case.symbols for case in self._cases)
+
+    @cached_property
+    def _cases(self) -> list[Case]:
+        return [point.config.case for point in self.study.points()]
 
     def draw(self) -> dict[str, Picture]:
         """Return the figures that can be drawn from the runs that have finished, by name."""
@@ -247,8 +254,7 @@ class Results:
         return pictures
 
     def _title(self, figure: Figure) -> str:
-        cases = [point.config.case for point in self.study.points()]
-        chosen = [cases[index] for index in self._chosen(figure)]
+        chosen = [self._cases[index] for index in self._chosen(figure)]
         return plotting.title([case.model_dump() | {"case": case.name} for case in chosen])
 
     def _chosen(self, figure: Figure) -> list[int]:
