@@ -10,6 +10,7 @@ from alsph.analysis.uncertainty import uncertainty_of_mean
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
+from scipy.signal import lfilter
 from synthetic import DRAG, LIFT, STROUHAL, signals
 
 settings.register_profile("alsph", deadline=None)  # busy machines are slow, not wrong
@@ -186,6 +187,25 @@ def test_decay_rate(rate, start):
     assert math.isnan(averages.decay_rate(time[:2], time[:2]))
 
 
+@pytest.mark.parametrize(("correlation", "least", "most"), [(0.0, 0.6, 0.8), (0.9, 0.6, 0.8), (0.99, 0.5, 0.7)])
+def test_the_uncertainty_of_a_decay_rate_covers_it_however_long_deviations_last(correlation, least, most):
+    random, time = np.random.default_rng(1), np.linspace(0, 1, 400)
+    covered = []
+    for _ in range(200):
+        steps = random.normal(size=(400,)) * math.sqrt(1 - correlation**2)
+        deviation = lfilter([1.0], [1.0, -correlation], steps, zi=[correlation * random.normal()])[0]
+        rate = averages.decay_rate(time, np.exp(-1.58 * time + 1e-3 * deviation))
+        covered.append(abs(rate - 1.58) <= rate.uncertainty)
+    assert least <= np.mean(covered) <= most
+
+
+def test_a_rate_that_changes_has_an_uncertainty_of_that_size():
+    for count in (100, 1000):
+        time = np.linspace(0, 1, count)
+        rate = averages.decay_rate(time, np.exp(-1.58 * time - 0.1 * time**2))
+        assert rate == pytest.approx(1.68, abs=1e-3) and rate.uncertainty == pytest.approx(0.026, rel=0.1)
+
+
 @pytest.mark.parametrize(
     ("value", "uncertainty", "text"),
     [
@@ -287,10 +307,14 @@ def test_a_mean_profile_is_over_the_sampled_part_of_the_window(start, end, mean,
 
 
 def test_decay_rate_and_its_standard_error():
+    """Of values that deviate by chance alone that of the line, and of four points more, since these tell little."""
+    time = np.linspace(0, 1, 2000)
+    logarithm = -1.58 * time + 1e-3 * np.random.default_rng(0).normal(size=2000)
+    found, line = averages.decay_rate(time, np.exp(logarithm)), stats.linregress(time, logarithm)
+    assert (found, found.uncertainty) == (pytest.approx(-line.slope), pytest.approx(line.stderr, rel=0.25))
     time, energy = np.array([0.0, 1.0, 2.0, 4.0]), np.array([1.0, 0.4, 0.1, 0.02])
-    line = stats.linregress(time, np.log(energy))
-    found = averages.decay_rate(time, energy)
-    assert (found, found.uncertainty) == pytest.approx((-line.slope, line.stderr))
+    found, line = averages.decay_rate(time, energy), stats.linregress(time, np.log(energy))
+    assert found == pytest.approx(-line.slope) and found.uncertainty > line.stderr
     assert averages.decay_rate(time[:3], np.exp(-time[:3])) == pytest.approx(1)
     for bad in (averages.decay_rate(time[:2], energy[:2]), averages.decay_rate(time, energy * (1, 1, 1, 0))):
         assert math.isnan(bad) and bad.note == "a decay rate needs three or more positive values"

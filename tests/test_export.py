@@ -113,6 +113,11 @@ def test_what_cannot_be_exported_is_refused_and_nothing_is_written(cylinder, als
     ):
         code, _, err = alsph("export", cylinder.path, *options)
         assert code == 2 and words in err and len(err.splitlines()) == 1
+    own = cylinder.path / "output_front.csv"
+    own.write_text("time,front\n")
+    code, _, err = alsph("export", cylinder.path, "--to", "csv", "--output", own)
+    assert code == 2 and "a file of the run itself" in err and own.read_text() == "time,front\n"
+    own.unlink()
     os.symlink(tmp_path / "elsewhere", tmp_path / "link.csv")
     with pytest.raises(RunFolderError, match="link"):
         cylinder.to_grid(spacing=0.5).save(tmp_path / "link.csv")

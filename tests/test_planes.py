@@ -186,5 +186,15 @@ def test_a_file_of_other_planes_is_told(past_a_cylinder, tmp_path):
         tmp_path / "run", until=0.02, planes="x=3", plane_interval=0.01, progress=False
     )
     (run.path / "planes.h5").write_bytes((past_a_cylinder.path / "planes.h5").read_bytes())
-    with pytest.raises(RunFolderError, match="holds 96 points, and the planes of case.toml have 32"):
+    with pytest.raises(RunFolderError, match="its 96 points are not the 32 of the planes in case.toml"):
+        _ = Run(run.path).planes
+
+
+def test_planes_that_were_moved_do_not_take_the_records_of_the_former_ones(tmp_path):
+    run = TaylorGreen(resolution=8).run(
+        tmp_path / "run", until=0.1, planes="x=0.5", plane_interval=0.05, progress=False
+    )
+    text = (run.path / "case.toml").read_text()
+    (run.path / "case.toml").write_text(text.replace("x=0.5", "x=0.25"))
+    with pytest.raises(RunFolderError, match="its 8 points are not the 8 of the planes in case.toml"):
         _ = Run(run.path).planes

@@ -184,6 +184,28 @@ def test_a_run_goes_back_with_its_inflow(case, tmp_path):
     assert alsph.repeat(path, progress=False).same
 
 
+def test_a_run_that_was_changed_on_its_way_and_back_says_so_and_has_no_reference(tmp_path):
+    """A change of the method, or of units, takes it no reference."""
+    path = TaylorGreen(resolution=10).run(tmp_path / "run", until=0.1, progress=False).path
+    settings, plain = path / "case.toml", (path / "case.toml").read_text()
+    whole = shutil.copytree(path, tmp_path / "whole")
+    resume(whole, until=0.3, progress=False)
+    for until, text in ((0.2, re.sub("courant = .*", "courant = 0.1", plain)), (0.3, plain)):
+        settings.write_text(text)
+        with pytest.warns(RuntimeWarning, match="goes on with other settings"):
+            run = resume(path, until=until, progress=False)
+    told = r"changed on the way: at tU/D = 0\.1\d* courant 0\.3 -> 0\.1; at tU/D = 0\.2\d* courant 0\.1 -> 0\.3; av"
+    assert re.match(told, run.remarks[0]) and run.measures[0].reference > 0
+    assert not any("changed" in remark for remark in alsph.open_run(whole).remarks)
+    for until, text in ((0.4, re.sub("reynolds = .*", "reynolds = 50.0", plain)), (0.5, plain)):
+        settings.write_text(text)
+        with pytest.warns(RuntimeWarning, match="goes on with other settings"):
+            run = resume(path, until=until, progress=False)
+    assert "reynolds 50.0 -> 100.0" in run.remarks[0] and np.isnan(run.measures[0].reference)
+    compared = alsph.compare([whole, path])
+    assert [name for name in compared.parameters if name.startswith("reynolds, changed at tU/D = 0.4")]
+
+
 def test_tools_take_the_inflow_of_a_case(case):
     """As describe and autotune make their simulations."""
     simulation = case.restored(case.build().state)

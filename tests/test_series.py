@@ -1,5 +1,6 @@
 """What runs with a free surface record in small CSV files: levels, front and sensors."""
 
+import re
 from dataclasses import fields
 from functools import partial
 
@@ -14,7 +15,7 @@ from alsph.cases.free_surface import Levels, Sensors
 from alsph.cases.sensors import WallSensors, _fitted
 from alsph.cases.series import Series
 from alsph.config import Config, RunSettings
-from alsph.errors import ConfigError
+from alsph.errors import ConfigError, RunFolderError
 from alsph.geometry.lattice import cell_centres, lattice
 from alsph.geometry.particles import Snapshot
 
@@ -73,6 +74,33 @@ def test_a_series_is_cut_with_its_run_and_one_of_an_older_version_too(tmp_path, 
     assert [each.name for each in tmp_path.iterdir()] == [Count.file]
     recorded(path, [2.0])
     assert path.read_text() == head + "0.5,0.5,2\n1,1,2\n2,2,2\n"
+
+
+def test_a_series_has_a_number_for_each_column_and_a_name_for_each_number(tmp_path):
+    with pytest.raises(ConfigError, match="output output_count.csv: two columns are called 'p'"):
+        Count(["time [s]", "p", "p"])
+    for names, told in ((["a"], "2 numbers for 1 columns"), (["a", "b", "c"], "2 numbers for 3 columns")):
+        with pytest.raises(ConfigError, match=told):
+            Count(["time [s]", *names]).record(At(1.0), {})
+
+
+def test_gauges_that_were_moved_do_not_go_on_in_the_file_of_the_former_ones(tmp_path):
+    """In another order, too: their depths would change places."""
+    tank = cases.DamBreak(resolution=8)
+    run = tank.run(tmp_path / "run", until=0.2, gauges=[[0.2], [0.8]], gauge_interval=0.1, progress=False)
+    assert run.gauges.depth.shape == (2, 2)
+    text = (run.path / "case.toml").read_text()
+    for moved in ("[0.8], [0.2]", "[0.2], [0.5]", "[0.2]"):
+        (run.path / "case.toml").write_text(
+            re.sub(r"gauges = \[.*?\]\n\]|gauges = .*", f"gauges = [{moved}]", text, flags=re.S, count=1)
+        )
+        with pytest.raises(RunFolderError, match="gauges.csv: it holds depth at x = 0.2"):
+            _ = alsph.open_run(run.path).gauges
+    with pytest.warns(
+        RuntimeWarning, match="gauges.csv is damaged .*at other places.* set aside as gauges.damaged.csv"
+    ):
+        later = alsph.resume(run.path, until=0.4, progress=False)
+    assert later.gauges.position.tolist() == [[0.2]] and later.gauges.time.min() > 0.2
 
 
 @pytest.mark.parametrize("torn", ["time [s],ti", "", None])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alsph.analysis.signals import amplitude_spectrum, batch_means, cycle_amplitudes, spectral_peak, upward_crossings
-from alsph.analysis.uncertainty import uncertainty_of_mean
+from alsph.analysis.uncertainty import slopes, uncertainty_of_mean
 from alsph.analysis.window import DEVELOPING, Window, averaging_window, drift_of, whole_record, with_trends
 from alsph.arrays import FloatArray
 
@@ -33,6 +33,10 @@ __all__ = [  # with what the analysis of signals is made of
     "upward_crossings",
     "whole_record",
 ]
+
+
+RATE_BATCHES = 20  # that the ± of a decay rate is found from
+HIDDEN = 3.0  # times one over their number: correlation that they do not show
 
 
 class Estimate(float):
@@ -199,6 +203,9 @@ def error_norms(computed: FloatArray, exact: FloatArray) -> dict[str, float]:
 def decay_rate(time: FloatArray, energy: FloatArray) -> Estimate:
     """Rate λ of an exponential decay exp(-λt), by a straight line through the logarithms (Taylor-Green: λ = 2Dνk²).
 
+    Its uncertainty is that of a line through twenty averages of the record, since successive values deviate alike: 0.7
+    of the rates lie within it where the deviations last for a fortieth of the record, 0.6 with a quarter.
+
     Parameters
     ----------
     time, energy : ndarray, shape (n,)
@@ -206,8 +213,13 @@ def decay_rate(time: FloatArray, energy: FloatArray) -> Estimate:
     """
     if len(time) < 3 or not np.all(energy > 0):
         return Estimate(np.nan, note="a decay rate needs three or more positive values")
-    slope, error = _slope(time, np.log(energy))
-    return Estimate(-slope, error)
+    line = np.stack([time, -np.log(energy)])
+    count = min(RATE_BATCHES, len(time))
+    rate, error = _slope(*line)[0], np.nan
+    if count > 3:
+        batches, values = np.array([part.mean(axis=1) for part in np.array_split(line, count, axis=1)]).T
+        error = float(slopes(batches[None], values, HIDDEN / count)[1][0])
+    return Estimate(rate, error)
 
 
 def observed_order(resolution: tuple[float, float], error: tuple[float, float]) -> float:

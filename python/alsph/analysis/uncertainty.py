@@ -71,27 +71,36 @@ def uncertainty_of_mean(averages: FloatArray, value: float) -> Uncertainty:
 def trend(averages: FloatArray) -> float:
     """Return the change from the first to the last average by a straight line or a bend if it is significant, else 0.
 
-    The bends are exponentials that change most at the begin or at the end. The standard error of a slope is that of
-    independent deviations from the line, times what their correlation with the next one adds, √((1+r)/(1-r)).
+    The bends are exponentials that change most at the begin or at the end.
     """
     count = len(averages)
     if count < LEAST:
         return 0.0
     time = np.arange(count) / (count - 1)
     shapes = np.stack([time, 1 - np.exp(-time / BEND), np.exp((time - 1) / BEND)])
-    centred, deviations = shapes - shapes.mean(axis=1)[:, None], averages - averages.mean()
-    squares = (centred**2).sum(axis=1)
-    slope = centred @ deviations / squares
-    rest = deviations - slope[:, None] * centred
-    residual = np.maximum((rest**2).sum(axis=1), np.finfo(float).tiny)
-    correlation = np.clip((rest[:, 1:] * rest[:, :-1]).sum(axis=1) / residual, 0.0, 0.9)
-    error = np.sqrt(residual / (count - 2) / squares * (1 + correlation) / (1 - correlation))
+    slope, error = slopes(shapes, averages)
     best = int(np.argmax(np.abs(slope) / error))
     change = slope[best] * (shapes[best, -1] - shapes[best, 0])
     from scipy.special import stdtrit
 
     least = max(TREND, stdtrit(count - 2, 0.975))
     return float(change) if abs(slope[best]) > least * error[best] else 0.0
+
+
+def slopes(shapes: FloatArray, averages: FloatArray, hidden: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    """Return how much averages (n,) rise along each of some shapes (m, n), and the standard errors of that.
+
+    They are those of independent deviations, times what their correlation with the next one adds, √((1+r)/(1-r)), r as
+    it is found and what a short series hides of it.
+    """
+    count = len(averages)
+    centred, deviations = shapes - shapes.mean(axis=1)[:, None], averages - averages.mean()
+    squares = (centred**2).sum(axis=1)
+    slope = centred @ deviations / squares
+    rest = deviations - slope[:, None] * centred
+    residual = np.maximum((rest**2).sum(axis=1), np.finfo(float).tiny)
+    correlation = np.clip((rest[:, 1:] * rest[:, :-1]).sum(axis=1) / residual + hidden, 0.0, 0.9)
+    return slope, np.sqrt(residual / (count - 2) / squares * (1 + correlation) / (1 - correlation))
 
 
 def _correlated(averages: FloatArray, value: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -16,7 +17,7 @@ from alsph.analysis.record import Record
 from alsph.analysis.sampling import pressure_on_walls
 from alsph.arrays import Arrays, FloatArray
 from alsph.cases.base import Case
-from alsph.cases.series import Series
+from alsph.cases.series import Series, names
 from alsph.engine.prescribed import asked
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError
@@ -106,9 +107,35 @@ class Levels(Series):
 
 
 class Gauges(Levels):
-    """The depth of the water at the `gauges` of a run."""
+    """The depth of the water at the `gauges` of a run.
+
+    Raises
+    ------
+    ValueError
+        If a file that is to go on is of other gauges.
+    """
 
     file = "gauges.csv"
+
+    @classmethod
+    def of(cls, case: Case, places: FloatArray) -> Gauges:
+        """Return those at places (m, d − 1) of a case."""
+        return cls(places, case.checked_domain, case.particle_spacing, case.symbols)
+
+    def check(self, path: Path) -> None:
+        """Refuse a file of other gauges."""
+        if (known := names(path)) and known != self.columns:
+            raise ValueError(f"it holds {', '.join(known[1:])}; the gauges are at other places")
+
+    def append(self, path: Path) -> None:
+        """Append what has been kept to the file."""
+        self.check(path)
+        super().append(path)
+
+    def truncate(self, path: Path, time: float) -> None:
+        """Drop what is later than `time`."""
+        self.check(path)
+        super().truncate(path, time)
 
 
 class Sensors(Series):

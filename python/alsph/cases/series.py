@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.engine.simulation import Simulation
+from alsph.errors import ConfigError
+from alsph.text import printable
 
 
 class Series(ABC):
@@ -32,13 +35,22 @@ class Series(ABC):
         Its name, ``output_NAME.csv``.
     interval : float
         Time between two records [D/U].
+
+    Raises
+    ------
+    ConfigError
+        If a column has the name of another, or a record holds not a number for each column but the time.
     """
 
     file: str
     interval: float
 
     def __init__(self, columns: Sequence[str]) -> None:
-        self.columns = columns
+        if twice := [name for name, count in Counter(columns).items() if count > 1]:
+            raise ConfigError(
+                f"output {self.file}: two columns are called '{printable(twice[0])}'; each needs its own name"
+            )
+        self.columns = list(columns)
         self.rows: list[list[str]] = []
 
     @abstractmethod
@@ -47,7 +59,13 @@ class Series(ABC):
 
     def record(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> None:
         """Keep them."""
-        self.rows.append([*map(_digits, (simulation.time, *self.values(simulation)))])
+        row = [*map(_digits, (simulation.time, *self.values(simulation)))]
+        if len(row) != len(self.columns):
+            numbers, names = len(row) - 1, len(self.columns) - 1
+            raise ConfigError(
+                f"output {self.file}: values() gave {numbers} numbers for {names} columns beside the time"
+            )
+        self.rows.append(row)
 
     def append(self, path: Path) -> None:
         """Append what has been kept to the file."""
@@ -80,6 +98,12 @@ class Series(ABC):
             return np.empty(0), np.empty((1, 0))
         table = np.loadtxt(rows, delimiter=",", ndmin=2).T
         return table[0], table[1:]
+
+
+def names(path: Path) -> list[str]:
+    """Return what a file calls its columns; none if there is no file, or no line that names them."""
+    head = _lines(path)[0] if path.exists() else []
+    return head[0].rstrip("\n").split(",") if head else []
 
 
 def _lines(path: Path) -> tuple[list[str], list[str]]:

@@ -256,10 +256,12 @@ def plane_records(found: Probes, grids: list[tuple[FloatArray, ...]], symbols: S
         If it was recorded on others.
     """
     counts = [math.prod(map(len, axes)) for axes in grids]
-    if len(found.time) and sum(counts) != len(found.position):
+    points = np.concatenate([found.position[:0], *(lattice(*axes) for axes in grids)])
+    same = points.shape == found.position.shape and np.allclose(points, found.position, rtol=0, atol=1e-9)
+    if len(found.time) and not same:
         raise RunFolderError(
-            f"planes.h5: holds {len(found.position)} points, and the planes of case.toml have {sum(counts)}; "
-            "one of the two files is of another run"
+            f"planes.h5: its {len(found.position)} points are not the {len(points)} of the planes in case.toml; "
+            "one of the two files is of another run, or case.toml was changed"
         )
     ends, records = np.cumsum([0, *counts]), []
     for axes, first, end in zip(grids, ends[:-1], ends[1:], strict=True):
@@ -318,7 +320,8 @@ def _check(path: Path) -> None:
     """Refuse a file that cannot be written, or that a run needs."""
     if not path.parent.is_dir():
         raise RunFolderError(f"{path.parent}: no such folder")
-    if (path.parent / "run.json").is_file() and OWN.fullmatch(path.name) and not EXPORTED.fullmatch(path.name):
+    own = OWN.fullmatch(path.name) or (path.name.startswith("output_") and path.exists())
+    if (path.parent / "run.json").is_file() and own and not EXPORTED.fullmatch(path.name):
         raise RunFolderError(f"{path}: a file of the run itself; choose another name")
     check_target(path)
 

@@ -7,9 +7,11 @@ from typing import Any
 from alsph.analysis.measures import Measure, alone
 from alsph.analysis.record import Record
 from alsph.cases.base import Case
+from alsph.cases.method import Method
 from alsph.cases.source import reason
 from alsph.config import Config
 from alsph.geometry.particles import Snapshot
+from alsph.results.outcome import changes
 from alsph.text import shown
 
 ELSEWHERE = "no reference: it is of the flow from the case's own start on, and this run goes on with another's"
@@ -37,7 +39,7 @@ def judged(run: Record, config: Config) -> tuple[list[Measure], list[str]]:
         found = case.measures(run)
         if odd := [measure for measure in found if not isinstance(measure, Measure)]:
             raise TypeError(f"{shown(odd[0])} is no Measure")
-        if case.is_driven or goes_on_elsewhere(run, config):
+        if stands_alone(run, config):
             found = alone(found)
         elif case.is_steady:
             found = _settled(found, case, run)
@@ -47,6 +49,12 @@ def judged(run: Record, config: Config) -> tuple[list[Measure], list[str]]:
         what = reason(error, case.code.file if case.code else "<cell>")
         return [], [f"no measures: those of {type(case).__name__} fail, {what}; correct the file that defines it"]
     return found, []
+
+
+def stands_alone(run: Record, config: Config) -> bool:
+    """Whether what is known of the case's flow does not hold for a run of it."""
+    names = {name for _, changed in changes(run) for name in changed}
+    return config.case.is_driven or goes_on_elsewhere(run, config) or bool(names - Method.model_fields.keys())
 
 
 def goes_on_elsewhere(run: Record, config: Config) -> bool:

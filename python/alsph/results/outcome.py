@@ -1,6 +1,8 @@
 """How a run ended, in words, as those of :mod:`alsph.cases.remarks`."""
 
+import itertools
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +11,8 @@ from alsph.analysis.record import Record
 from alsph.analysis.window import Window
 from alsph.arrays import FloatArray
 from alsph.cases.free_surface import ENERGY
+from alsph.config import of_the_flow
+from alsph.text import shown
 
 DIVERGENCE = 0.02
 """Mean |∇·u| [U/D] above which it is remarked upon; runs with the defaults have 1e-4 to 5e-3 (docs/results.md)."""
@@ -31,6 +35,8 @@ def outcome(run: Record, until: str) -> list[str]:
         found.append(f"{run.status}: at tU/D = {reached:.4g} of {until}; results are those up to there")
     if retries := run.info.get("retries"):
         found.append(f"retried: broke down {len(retries)} times, went on with smaller time steps")
+    if told := [f"at tU/D = {time:.4g} {_told(what)}" for time, what in changes(run)]:
+        found.append(f"changed on the way: {'; '.join(told)}; averages may go across it")
     if run.divergence.mean > DIVERGENCE:
         text = f"mean |∇·u| = {float(run.divergence.mean):.2g} U/D"
         remedy = "more projection_sweeps or max_iterations lower it"
@@ -43,6 +49,30 @@ def outcome(run: Record, until: str) -> list[str]:
         if run.drag.mean < 0 and not (has_moved(run.history) or has_surface(run.history)):
             found.append(f"unphysical: mean drag coefficient {run.drag.mean}; a stream drags a body at rest along")
     return found
+
+
+def changes(run: Record) -> list[tuple[float, dict[str, tuple[Any, Any]]]]:
+    """Return when a run was made to go on with other parameters [D/U], and what each of these was and became."""
+    times = run.history["time"]
+    steps = run.history.get("step", 1 + np.arange(len(times)))
+    retried = {retry["step"] for retry in run.info.get("retries", [])}
+    found = []
+    for before, after in itertools.pairwise(run.info.get("segments", [])):
+        was, became = (of_the_flow(part["case"]) for part in (before, after))
+        names = [name for name in was | became if was.get(name) != became.get(name)]
+        made = steps <= after["step"]
+        if names and made.any() and not made.all() and after["step"] not in retried:
+            found.append((float(times[made][-1]), {name: (was.get(name), became.get(name)) for name in names}))
+    return found
+
+
+def _told(changed: Mapping[str, tuple[Any, Any]]) -> str:
+    """Return changes in words; what a table such as an outline holds is too long for any."""
+    words = {
+        name: ["none" if v is None else "a table" if isinstance(v, dict) else shown(v) for v in values]
+        for name, values in changed.items()
+    }
+    return ", ".join(f"{name} {was} -> {became}" for name, (was, became) in words.items())
 
 
 def has_moved(history: Mapping[str, FloatArray]) -> bool:

@@ -29,7 +29,7 @@ from alsph.geometry.plane import Plane
 from alsph.parameters import choose
 from alsph.results.dimensional import dimensional
 from alsph.results.export import Grid
-from alsph.results.judged import ELSEWHERE, goes_on_elsewhere, judged
+from alsph.results.judged import ELSEWHERE, goes_on_elsewhere, judged, stands_alone
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.loads import Loads
 from alsph.results.outcome import made, outcome, unsolved
@@ -107,16 +107,28 @@ class Run(Loads):
 
     @cached_property
     def gauges(self) -> GaugeRecord:
-        """The depth of the water at the run's gauges over time; empty without any."""
+        """The depth of the water at the run's gauges over time; empty without any.
+
+        Raises
+        ------
+        RunFolderError
+            If the file is of other gauges than the configuration's.
+        """
+        places, path = self.config.gauges, self.path / Gauges.file
+        if not len(places):
+            return GaugeRecord(places, np.empty(0), np.empty((0, 0)))
+        try:
+            Gauges.of(self.config.case, places).check(path)
+        except ValueError as error:
+            raise RunFolderError(f"{path}: {error} in case.toml, which is of another run or was changed") from None
         time, depth = Gauges.read(self)
-        return GaugeRecord(self.config.gauges, time, depth.T[:, : len(self.config.gauges)])
+        return GaugeRecord(self.config.gauges, time, depth.T)
 
     @cached_property
     def profiles(self) -> list[Profile]:
         """Curves of the run beside their reference curves."""
-        found = self.config.case.profiles(self)
-        case = self.config.case
-        alone = case.is_driven or case.no_reference or goes_on_elsewhere(self, self.config)
+        found, case = self.config.case.profiles(self), self.config.case
+        alone = case.no_reference or stands_alone(self, self.config)
         return [profile.alone() for profile in found] if alone else found
 
     @cached_property

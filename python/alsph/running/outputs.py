@@ -145,8 +145,7 @@ def outputs_of(config: Config) -> list[Output]:
 def _gauges_of(config: Config) -> Iterator[Gauges]:
     """Yield the depth of the water, where there are gauges."""
     if len(config.gauges):
-        case = config.case
-        gauges = Gauges(config.gauges, case.checked_domain, case.particle_spacing, case.symbols)
+        gauges = Gauges.of(config.case, config.gauges)
         gauges.interval = config.run.gauge_interval or gauges.interval
         yield gauges
 

@@ -21,6 +21,7 @@ from alsph.cases.source import shown_name
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder.durable import write_text
 from alsph.geometry.shape import Shape
+from alsph.results.outcome import changes
 from alsph.results.run import Run
 from alsph.study.declaration import text
 from alsph.symbols import Symbols, in_common
@@ -223,6 +224,11 @@ def _parameters(run: Run) -> dict[str, str]:
     values = {name: getattr(config.case, name) for name in config.case.parameter_names()}
     settings = {f"run.{name}": getattr(config.run, name) for name in type(config.run).model_fields}
     values |= settings | {f"run.{name}": value for name, value in config.ending.items()}
+    values |= {
+        f"{name}, changed at tU/D = {time:.4g}": became
+        for time, what in changes(run)
+        for name, (_, became) in what.items()
+    }
     case = f"{shown_name(declared)}{_sum(declared['sha256'])}" if isinstance(declared, dict) else declared
     return {"case": case} | {name: _parameter(value) for name, value in values.items()}
 
