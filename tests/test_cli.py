@@ -207,6 +207,8 @@ def test_cases_and_version(alsph):
         (["run", "cylinder", "--threads", "0"], "run.threads = 0: must be greater than or equal to 1"),
         (["run", "cylinder", "--bogus", "1"], "No such option"),
         (["describe", "cylinder", "--resolution", "100000"], "GiB of memory"),
+        (["converge", "poiseuille", "--resolution", "8"], "Possible options: --resolutions"),
+        (["run", "cylinder", "--probe-interval", "0.1"], "run.probe_interval: there are no probes; say where by probes"),
         (["info", "missing"], "missing"),
         (["plot", "missing"], "missing"),
         (["resume", "missing"], "missing"),

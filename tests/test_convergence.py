@@ -2,7 +2,9 @@
 
 import math
 
+import numpy as np
 import pytest
+from alsph.analysis.averages import Estimate
 from alsph.cases import Cylinder, TaylorGreen
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError
@@ -78,3 +80,11 @@ def test_an_error_is_not_extrapolated_below_zero():
     found = grid_convergence("error", [10, 14, 20], [0.30, 0.265, 0.23], 0.0)
     assert found.kind == "monotonic" and math.isnan(found.richardson) and math.isnan(found.order)
     assert grid_convergence("error", [10, 20, 40], [0.4, 0.1, 0.025], 0.0).order == pytest.approx(2.0, abs=1e-6)
+
+
+def test_changes_within_their_uncertainties_tell_no_order():
+    values = [Estimate(1.52, 0.05), Estimate(1.50, 0.05), Estimate(1.4917, 0.05)]
+    found = grid_convergence("mean drag coefficient", [10, 14, 20], values)
+    assert found.kind == "within ±" and np.isnan([found.order, found.richardson, found.index]).all()
+    sharp = grid_convergence("mean drag coefficient", [10, 14, 20], [Estimate(value, 1e-3) for value in values])
+    assert sharp.kind == "monotonic" and sharp.order == pytest.approx(2.72, abs=0.01)

@@ -155,7 +155,7 @@ class Config:
         return of_the_flow(self.case_tables())
 
     def check(self) -> None:
-        """Refuse parameters that a file cannot give back, and probes, planes and gauges outside of the domain.
+        """Refuse parameters that a file cannot give back, and probes, planes and gauges that cannot be.
 
         Raises
         ------
@@ -176,6 +176,9 @@ class Config:
             told = f"{odd[0]} = {shown(values[odd[0]])}: a parameter of {kind.__name__} that its file cannot give back"
             raise ConfigError(f"{told}; use numbers, texts, true or false, and lists of them")
         _ = self.probes, self.planes, self.gauges
+        for name in ("probe", "plane", "gauge"):
+            if getattr(self.run, f"{name}_interval") and not getattr(self.run, f"{name}s"):
+                raise ConfigError(f"run.{name}_interval: there are no {name}s; say where by {name}s, or leave it out")
 
     def text(self) -> str:
         """Return the configuration with all its parameters as TOML."""

@@ -91,15 +91,17 @@ def _autotune(
 
 def _converge(
     given: Given,
-    resolutions: Annotated[str, typer.Option(help="three or more resolutions D/Δx, as 10,14,20")] = "10,14,20",
+    resolution: Annotated[
+        str, typer.Option("--resolutions", help="three or more resolutions D/Δx, as 10,14,20")
+    ] = "10,14,20",
     jobs: Jobs = None,
     output: StudyOutput = Path("runs/studies"),
     scheduler: Scheduler = None,
 ) -> None:
     try:
-        ladder = [int(text) for text in resolutions.split(",")]
+        ladder = [int(text) for text in resolution.split(",")]
     except ValueError:
-        raise ConfigError(f"resolutions = {resolutions!r}: must be whole numbers with commas, as 10,14,20") from None
+        raise ConfigError(f"resolutions = {resolution!r}: must be whole numbers with commas, as 10,14,20") from None
     threads = given.config.run.threads or 1
     report = alsph.converge(given.config, ladder, output, jobs=jobs, threads=threads, scheduler=scheduler)
     say(f"\n{report}\n{report.path / 'convergence.md'}")

@@ -43,8 +43,8 @@ class Convergence:
     values : tuple of float
         The result at each.
     kind : str
-        ``monotonic``, ``oscillating`` or ``diverging``: how the last three follow each other; ``unknown`` if one of
-        them is NaN.
+        ``monotonic``, ``oscillating`` or ``diverging``: how the last three follow each other; ``within ±`` if the last
+        two differ by no more than their uncertainties, ``unknown`` if one of the three is NaN.
     order : float
         Observed order p; NaN unless monotonic.
     richardson : float
@@ -79,7 +79,7 @@ def grid_convergence(
     resolutions
         At least three D/Δx, increasing; their ratios may differ.
     values
-        The result at each.
+        The result at each; an :class:`alsph.analysis.averages.Estimate` with its uncertainty.
     reference
         Independent value.
 
@@ -99,6 +99,8 @@ def grid_convergence(
     unknown = np.nan, np.nan
     if not np.isfinite([coarse, fine]).all():
         return Convergence(name, *known, "unknown", *unknown, np.nan, reference)
+    if fine and abs(fine) <= np.hypot(*map(_uncertainty, known[1][-2:])):
+        return Convergence(name, *known, "within ±", *unknown, np.nan, reference)
     if fine == 0:
         return Convergence(name, *known, "monotonic", *unknown, np.nan, reference)
     ratio, r12, r23 = coarse / fine, n2 / n1, n3 / n2
@@ -184,7 +186,7 @@ class Report:
         rows = [
             [
                 found.name,
-                *(f"{value:.5g}{remark(value)}" for value in found.values),
+                *(str(value) if _uncertainty(value) else f"{value:.5g}{remark(value)}" for value in found.values),
                 found.kind,
                 _shown(found.order, ".2f"),
                 _shown(found.richardson, ".5g"),
@@ -202,7 +204,8 @@ class Report:
         panels: dict[str, list[Curve]] = {}
         for found in self.convergences:
             spacing = [1 / n for n in found.resolutions]
-            curves = [Curve("alsph", spacing, list(found.values))]
+            bars = [_uncertainty(value) for value in found.values]
+            curves = [Curve("alsph", spacing, list(found.values), [bar if np.isfinite(bar) else 0.0 for bar in bars])]
             if np.isfinite(found.richardson):
                 band = [abs(found.index * found.values[-1])]
                 curves.append(Curve("Richardson, ± GCI", [0.0], [found.richardson], band, style="s"))
@@ -276,6 +279,12 @@ def converge(
     report = Report(results.path, results, convergences)
     report.save()
     return report
+
+
+def _uncertainty(value: float) -> float:
+    """Return the ± of a value, zero where it has none."""
+    found = getattr(value, "uncertainty", np.nan)
+    return 0.0 if np.isnan(found) else float(found)
 
 
 def _shown(value: float, form: str, unit: str = "") -> str:
