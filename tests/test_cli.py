@@ -208,7 +208,7 @@ def test_cases_and_version(alsph):
         (["run", "cylinder", "--bogus", "1"], "No such option"),
         (["describe", "cylinder", "--resolution", "100000"], "GiB of memory"),
         (["converge", "poiseuille", "--resolution", "8"], "Possible options: --resolutions"),
-        (["run", "cylinder", "--probe-interval", "0.1"], "run.probe_interval: there are no probes; say where by probes"),
+        (["run", "cylinder", "--probe-interval", "0.1"], "run.probe_interval: there are no probes"),
         (["info", "missing"], "missing"),
         (["plot", "missing"], "missing"),
         (["resume", "missing"], "missing"),
