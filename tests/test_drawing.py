@@ -128,6 +128,11 @@ def test_several_bodies_keep_their_places_and_what_is_no_curve_is_told(tmp_path)
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
+        (
+            "a.svg",
+            SVG.format('<circle r="5" visibility="hidden"/>'),
+            "a.svg: holds no curves; .*not show them: 1 circle",
+        ),
         ("a.svg", "", "a.svg: no SVG that can be read"),
         ("a.svg", "<svg", "a.svg: no SVG that can be read"),
         ("a.svg", b"\x00\xff" * 50, "a.svg: no SVG that can be read"),
@@ -225,3 +230,148 @@ def test_a_curve_within_a_curve_is_a_hole(tmp_path, name, content, share):
     assert body.area == pytest.approx((1 - share) * whole, rel=2e-3)
     assert "with 1 hole" in str(outline)
     assert Outline(**outline.model_dump()).polygons == outline.polygons
+
+
+SQUARE = [(0, 0), (2, 0), (2, 2), (0, 2)]
+
+
+def sides(space, corners, left=0):
+    for (x0, y0), (x1, y1) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        space.add_line((x0 + left, y0), (x1 + left, y1))
+
+
+def square_beside_doubled_lines(drawing, space):
+    space.add_lwpolyline(SQUARE, close=True)
+    sides(space, SQUARE, left=5)
+    sides(space, SQUARE[::-1], left=5)
+
+
+def circle_around_doubled_lines(drawing, space):
+    space.add_circle((1, 1), 4)
+    sides(space, SQUARE)
+    sides(space, SQUARE)
+
+
+def test_lines_drawn_twice_are_taken_once(tmp_path):
+    square, doubled = drawn(tmp_path, "a.dxf", dxf(square_beside_doubled_lines)).polygons
+    assert (square.area, doubled.area) == pytest.approx((4 / 49, 4 / 49), rel=1e-5) and doubled.bounds[
+        0
+    ] == pytest.approx(5 / 7, rel=1e-5)
+    (body,) = drawn(tmp_path, "a.dxf", dxf(circle_around_doubled_lines)).polygons
+    assert body.area == pytest.approx(np.pi / 4 - 4 / 64, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "place"),
+    [
+        ("a.dxf", dxf(lambda drawing, space: sides(space, [(5, 1), (6, 2), (6, 1), (5, 2)])), r"\(5, 1\)"),
+        (
+            "a.svg",
+            SVG.format('<path d="M0 0h20v20h-20z"/><path d="M50 3L70 20L70 3L50 20"/><path d="M50 20L50 3"/>'),
+            r"\(50, -3\)",
+        ),
+        (
+            "a.dxf",
+            dxf(lambda drawing, space: [sides(space, SQUARE), sides(space, [(7, 1), (8, 1), (9, 1)])]),
+            r"\(7, 1\)",
+        ),
+    ],
+)
+def test_open_curves_that_meet_themselves_are_refused_where_they_are(tmp_path, name, content, place):
+    with pytest.raises(ConfigError, match=f"{name}: a curve through {place} meets itself; draw it"):
+        drawn(tmp_path, name, content)
+
+
+def a_layer(switch):
+    def draw(drawing, space):
+        getattr(drawing.layers.add("notes"), switch)()
+        space.add_lwpolyline(SQUARE, close=True)
+        space.add_circle((9, 9), 1, dxfattribs={"layer": "Notes"})
+
+    return draw
+
+
+def unseen(drawing, space):
+    space.add_lwpolyline(SQUARE, close=True)
+    space.add_circle((9, 9), 1, dxfattribs={"invisible": 1})
+
+
+def a_block_on_a_frozen_layer(drawing, space):
+    drawing.layers.add("notes").freeze()
+    drawing.blocks.new("inner").add_circle((9, 9), 1)
+    drawing.blocks.new("outer").add_blockref("inner", (0, 0), dxfattribs={"layer": "notes"})
+    space.add_lwpolyline(SQUARE, close=True)
+    space.add_blockref("outer", (0, 0))
+
+
+HIDDEN = '<path d="M0 0h20v20h-20z"/>{}'
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "left_out"),
+    [
+        ("a.dxf", dxf(a_layer("off")), "1 CIRCLE"),
+        ("a.dxf", dxf(a_layer("freeze")), "1 CIRCLE"),
+        ("a.dxf", dxf(unseen), "1 CIRCLE"),
+        ("a.dxf", dxf(a_block_on_a_frozen_layer), "1 CIRCLE"),
+        ("a.svg", SVG.format(HIDDEN.format('<mask id="m"><circle cx="90" r="5"/></mask>')), "1 mask"),
+        ("a.svg", SVG.format(HIDDEN.format('<symbol id="s"><circle cx="90" r="5"/></symbol>')), "1 symbol"),
+        ("a.svg", SVG.format(HIDDEN.format('<circle cx="90" r="5" visibility="hidden"/>')), "1 circle"),
+        ("a.svg", SVG.format(HIDDEN.format('<g style="visibility:hidden"><circle cx="90" r="5"/></g>')), "1 circle"),
+        ("a.svg", SVG.format(HIDDEN.format('<g display="none"><circle r="5" display="inline"/></g>')), "1 group"),
+    ],
+)
+def test_what_a_drawing_does_not_show_is_left_out_and_told(tmp_path, name, content, left_out):
+    outline = drawn(tmp_path, name, content)
+    (square,) = outline.polygons
+    assert square.area == pytest.approx(1)
+    assert outline.remark.endswith(f"; left out, for the drawing does not show them: {left_out}")
+
+
+def test_blocks_on_layers_that_are_shown_are_shown_with_their_layer_0(tmp_path):
+    def draw(drawing, space):
+        drawing.layers.get("0").off()
+        drawing.blocks.new("part").add_lwpolyline(SQUARE, close=True)
+        space.add_blockref("part", (0, 0), dxfattribs={"layer": "parts"})
+
+    (square,) = drawn(tmp_path, "a.dxf", dxf(draw)).polygons
+    assert square.area == pytest.approx(1)
+
+
+@pytest.mark.parametrize("kind", ["defs", "symbol"])
+def test_what_an_svg_uses_is_no_left_out_curve(tmp_path, kind):
+    content = f'<{kind}><path id="p" d="M0 0h20v20h-20z"/></{kind}><use href="#p"/><use href="#p" x="60"/>'
+    outline = drawn(tmp_path, "a.svg", SVG.format(content.replace("<symbol>", '<symbol id="s">')))
+    assert [body.area for body in outline.polygons] == pytest.approx(2 * [1 / 16])
+    assert "no curves" not in outline.remark
+    lost = drawn(tmp_path, "a.svg", SVG.format(HIDDEN.format('<use href="#gone"/>')))
+    assert lost.remark.endswith("left out, for they are no curves: 1 use")
+
+
+def feature(shape):
+    return {"type": "Feature", "properties": {}, "geometry": shape and shape.__geo_interface__}
+
+
+def test_geojson_that_may_be_in_degrees_says_so(tmp_path):
+    def remark(shape, **members):
+        collection = {"type": "FeatureCollection", "features": [feature(shape)], **members}
+        return drawn(tmp_path, "a.geojson", json.dumps(collection)).remark
+
+    def system(name):
+        return {"type": "name", "properties": {"name": f"urn:ogc:def:crs:{name}"}}
+
+    islet, map_in_metres = shapely.box(10.0, 60.0, 10.02, 60.01), shapely.box(5e5, 6e6, 5.01e5, 6.001e6)
+    told = "its degrees are taken as lengths, and a map is to be projected first"
+    assert told in remark(islet) and told in remark(islet, crs=system("OGC:1.3:CRS84"))
+    assert told in remark(shapely.box(-180, -90, 180, 90))
+    assert told not in remark(map_in_metres) and told not in remark(shapely.box(0, 0, 1, 91))
+    assert told not in remark(islet, crs=system("EPSG::25832"))
+
+
+def test_features_without_a_geometry_are_left_out(tmp_path):
+    features = [feature(None), feature(shapely.box(0, 0, 200, 200))]
+    collection = json.dumps({"type": "FeatureCollection", "features": features})
+    outline = drawn(tmp_path, "a.geojson", collection)
+    assert len(outline.polygons) == 1 and "left out, for they are no curves: 1 Feature without" in outline.remark
+    with pytest.raises(ConfigError, match="holds no curves; .*1 Feature without geometry"):
+        drawn(tmp_path, "a.geojson", json.dumps(feature(None)))

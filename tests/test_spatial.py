@@ -134,6 +134,43 @@ def test_files_that_are_no_closed_mesh_are_refused(tmp_path):
         Mesh(**spoilt)
 
 
+def together(*meshes):
+    return trimesh.util.concatenate(meshes)
+
+
+def test_shells_that_overlap_are_refused_also_where_no_corner_lies_within_another():
+    def box(extents, at):
+        return trimesh.creation.box(extents).apply_translation(at)
+
+    block, knob = trimesh.creation.box((1, 0.5, 0.5)), box((0.5, 0.5, 0.5), (0, 0.3, 0))
+    bars = [trimesh.creation.box((3, 1, 1)), box((1, 3, 1), (0, 0, 0.3))]
+    on_top = box((0.5, 0.5, 0.5), (0, 0, 0.5))
+    for meshes in ((block, knob), bars, (block, on_top), (box((1, 1, 1), (5, 0, 0)), block, knob)):
+        numbers = f"{len(meshes) - 1} and {len(meshes)}"
+        with pytest.raises(ConfigError, match=f"its shells {numbers} overlap near .*; unite them in the program"):
+            Body3D(shape=together(*meshes))
+
+
+def test_shells_within_others_are_filled():
+    cavity, core = (trimesh.creation.icosphere(subdivisions=2, radius=radius) for radius in (2.5, 1.0))
+    cavity.invert()
+    hollow = Mesh.of(together(BALL, cavity, core))
+    assert hollow.triangles == Mesh.of(BALL).triangles
+    assert "2 of its 3 shells, within others, left out: the body is solid there" in hollow.remark
+    assert not Mesh.of(trimesh.creation.annulus(0.3, 0.5, 1.0)).remark
+
+
+def test_shells_apart_are_one_body_and_told_so():
+    pair = Mesh.of(together(BALL, BALL.copy().apply_translation((9, 0, 0))))
+    body = pair.volume(scale=5.0)
+    assert body.volume == pytest.approx(2 * Mesh.of(BALL).volume(scale=2.0).volume)
+    assert body.height(np.array([[0.0, 0, 0], [1.5, 0, 0], [-1.5, 0, 0]])) == pytest.approx([0.5, -1, -1], abs=0.02)
+    told = "mesh: <mesh>: its 2 shells, apart from each other, are one body: drag and lift are those of all of them"
+    case = Body3D(shape=Mesh(**pair.model_dump()))
+    assert any(remark.startswith(told) for remark in case.remarks())
+    assert not any(remark.startswith("mesh: ") for remark in Body3D(shape=BALL).remarks())
+
+
 def test_a_cube_is_that_of_a_mesh():
     for angle in (0.0, 20.0):
         cube, mesh = (Body3D(shape=shape, scale=0.8, angle_of_attack=angle).volume() for shape in ("cube", BOX))

@@ -20,8 +20,10 @@ class Body3D(Spatial):
     """Flow past a body in space in a channel with free-slip walls and uniform inflow U: a cube, or a triangle mesh.
 
     D is the body's largest extent, the side of the cube, unless `scale` is given; its centre of volume lies at
-    (upstream, 0, 0), and it is turned about it. The solid particles follow its surface. A body of which more than half
-    is thinner than 2 Δx is refused. Force coefficients are formed with its frontal area as it is turned.
+    (upstream, 0, 0), and it is turned about it. The solid particles follow its surface. Shells of a mesh that lie apart
+    are one body with common forces, closed cavities are filled with it, and shells that overlap are refused. A body of
+    which more than half is thinner than 2 Δx is refused. Force coefficients are formed with its frontal area as it is
+    turned.
     """
 
     name: ClassVar[str] = "body_3d"
@@ -52,6 +54,12 @@ class Body3D(Spatial):
         if isinstance(self.shape, Mesh):
             return self.shape.volume(self.scale, self.angle_of_attack)
         return cube(self.scale, self.angle_of_attack)
+
+    def remarks(self) -> list[str]:
+        """Return what is to be said, first of how the file was read."""
+        if isinstance(self.shape, str) or not self.shape.remark:
+            return super().remarks()
+        return [f"mesh: {self.shape.file}: {self.shape.remark}", *super().remarks()]
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces, also the mean lift; of a quarter the drag alone."""

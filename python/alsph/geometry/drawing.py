@@ -4,10 +4,12 @@ Curves within curves are holes in them, by the even-odd rule, whatever a drawing
 """
 
 import io
+import json
 from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import shapely
@@ -30,8 +32,16 @@ MEETING = 1e-6
 
 MOST_CURVES = 5000
 
+DEGREES = (
+    "GeoJSON is in degrees as a rule: if this is, its degrees are taken as lengths, and a map is to be projected first"
+)
+"""What is said of coordinates that may be longitudes and latitudes."""
+
 Found = tuple[list[FloatArray], list[str]]
-"""The curves of a drawing, each an array (n, 2), and what was left out of it."""
+"""The curves of a drawing, each an array (n, 2), and what is to be said of them."""
+
+DEFINITIONS = ("marker", "mask", "symbol")
+"""Elements of SVG that are drawn only where others refer to them, of those that svgelements draws where they stand."""
 
 
 def is_drawing(path: Path) -> bool:
@@ -53,7 +63,7 @@ def read(path: Path) -> tuple[list[shapely.Polygon], str]:
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
     try:
-        curves, left_out = READERS[path.suffix.lower()](content)
+        curves, said = READERS[path.suffix.lower()](content)
     except ImportError as error:
         suffix = path.suffix.lower()
         raise ConfigError(f"{name}: {suffix} needs {error.name}: pip install 'alsph[drawings]'") from None
@@ -61,7 +71,8 @@ def read(path: Path) -> tuple[list[shapely.Polygon], str]:
         raise ConfigError(f"{name}: no {path.suffix[1:].upper()} that can be read: {printable(str(error))}") from None
     curves = [curve for curve in curves if len(curve) > 1]
     if not curves:
-        raise ConfigError(f"{name}: holds no curves; outlines are closed paths, polylines, circles or polygons")
+        told = "; ".join(["outlines are closed paths, polylines, circles or polygons", *said])
+        raise ConfigError(f"{name}: holds no curves; {told}")
     if len(curves) > MOST_CURVES:
         raise ConfigError(f"{name}: holds {len(curves):,} curves; {MOST_CURVES:,} are the most, draw outlines alone")
     points = np.concatenate(curves)
@@ -72,11 +83,11 @@ def read(path: Path) -> tuple[list[shapely.Polygon], str]:
     bodies = _closed([(curve - lower) / extent for curve in curves], lambda at: at * extent + lower, name)
     unit = "pixels of 1/96 inch" if path.suffix.lower() == ".svg" else "units of the file"
     size = f"its larger extent is {extent:.6g} {unit}, and D, or as many D as `scale` says"
-    return bodies, "; ".join([size, *left_out])
+    return bodies, "; ".join([size, *said])
 
 
 def _closed(curves: list[FloatArray], back: Callable[[FloatArray], FloatArray], name: str) -> list[shapely.Polygon]:
-    """Return what the curves go around; those that are open are joined where their ends meet."""
+    """Return what the curves go around; those that are open are joined where their ends meet, each taken once."""
     ends = [float(np.hypot(*(curve[-1] - curve[0]))) for curve in curves]
     closed = [
         shapely.Polygon(curve) for curve, gap in zip(curves, ends, strict=True) if gap < MEETING and len(curve) > 3
@@ -85,29 +96,62 @@ def _closed(curves: list[FloatArray], back: Callable[[FloatArray], FloatArray], 
     if not rest:
         return closed
     lines = shapely.set_precision([shapely.LineString(curve) for curve in rest], MEETING)
-    found, cuts, dangles, _ = shapely.polygonize_full(lines)
-    for loose in (dangles, cuts):
-        if not loose.is_empty:
-            x, y = back(shapely.get_coordinates(loose)[0])
-            raise ConfigError(f"{name}: a curve is not closed, it ends at ({x:.6g}, {y:.6g}); close it, or take it out")
+    once = dict(zip(shapely.normalize(lines), lines, strict=True))  # whichever way they are drawn
+    found, cuts, dangles, crossing = shapely.polygonize_full(list(once.values()))
+    ending = "is not closed, it ends at ({}, {}); close it, or take it out"
+    meeting = "through ({}, {}) meets itself; draw it without a crossing, and each of its lines once"
+    for parts, fault in ((dangles, ending), (cuts, ending), (crossing, meeting)):
+        if not parts.is_empty:
+            tips = np.concatenate([curve[[0, -1]] for curve in rest])
+            x, y = back(min(tips, key=lambda tip: float(np.hypot(*(tip - shapely.get_coordinates(parts)[0])))))
+            raise ConfigError(f"{name}: a curve {fault.format(f'{x:.6g}', f'{y:.6g}')}")
     return [*closed, *(shapely.Polygon(part.exterior) for part in shapely.get_parts(found))]
 
 
 def _svg(content: bytes) -> Found:
     import svgelements
 
-    drawing = svgelements.SVG.parse(io.BytesIO(content), reify=True)
-    curves, other = [], Counter[str]()
-    for element in drawing.elements():
-        if isinstance(element, svgelements.Shape):
+    tree = ElementTree.fromstring(content)
+    curves: list[FloatArray] = []
+    other, hidden = Counter[str](), _undrawn(tree)
+    drawing = svgelements.SVG.parse(io.BytesIO(ElementTree.tostring(tree)), reify=True, parse_display_none=True)
+    for element in _displayed(drawing, hidden):
+        kind = type(element).__name__.lower()
+        if not isinstance(element, svgelements.Shape):
+            other[kind] += isinstance(element, svgelements.Text | svgelements.Image | svgelements.Use)
+        elif element.values.get("visibility") in ("hidden", "collapse"):
+            hidden[kind] += 1
+        else:
             path = svgelements.Path(element)
             path.reify()
             curves += [_sampled(svgelements.Path(part)) for part in path.as_subpaths()]
-        elif isinstance(element, svgelements.Text | svgelements.Image | svgelements.Use) and not isinstance(
-            element, svgelements.Group
-        ):
-            other[type(element).__name__.lower()] += 1
-    return [curve * [1.0, -1.0] for curve in curves if len(curve)], _left_out(other)
+    return [curve * [1.0, -1.0] for curve in curves if len(curve)], _left_out(other, hidden)
+
+
+def _displayed(element: Any, hidden: Counter[str]) -> Iterable[Any]:
+    """Return what an element of svgelements is made of, without what it says it does not display."""
+    if element.values.get("display") == "none":
+        hidden[type(element).__name__.lower()] += 1
+    elif isinstance(element, list) and element:  # groups are lists, and what refers to one
+        for part in element:
+            yield from _displayed(part, hidden)
+    else:
+        yield element
+
+
+def _undrawn(drawing: ElementTree.Element) -> Counter[str]:
+    """Put definitions into `defs`, where they are not drawn, and return of what kinds those are that nothing uses."""
+    used = {value for element in drawing.iter() for name, value in element.items() if name.endswith("href")}
+    unused = Counter[str]()
+    for parent in [element for element in drawing.iter() if not element.tag.endswith("defs")]:
+        for place, child in enumerate(parent):
+            kind = child.tag.rpartition("}")[2]
+            if kind in DEFINITIONS:
+                parent[place] = ElementTree.Element(child.tag.replace(kind, "defs"))
+                parent[place].append(child)
+                if f"#{child.get('id')}" not in used:
+                    unused[kind] += 1
+    return unused
 
 
 def _sampled(path: Any) -> FloatArray:
@@ -133,8 +177,23 @@ def _dxf(content: bytes) -> Found:
     import ezdxf.recover
 
     drawing, _ = ezdxf.recover.read(io.BytesIO(content))
-    paths, other = [], Counter[str]()
-    for entity in ezdxf.disassemble.recursive_decompose(drawing.modelspace()):
+    paths, other, hidden = [], Counter[str](), Counter[str]()
+    off = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_off() or layer.is_frozen()}
+
+    def is_hidden(entity: Any) -> bool:
+        block, layer = entity.source_block_reference, entity.dxf.layer.lower()
+        within = block is not None and is_hidden(block)
+        own = layer in off and (block is None or layer != "0")  # layer 0 of a block is that which the block is put on
+        return bool(entity.dxf.invisible or own or within)
+
+    def shown(entities: Iterable[Any]) -> Iterable[Any]:
+        for entity in entities:
+            if is_hidden(entity):
+                hidden[entity.dxftype()] += 1
+            else:
+                yield entity
+
+    for entity in shown(ezdxf.disassemble.recursive_decompose(shown(drawing.modelspace()))):
         try:
             paths.append(ezdxf.path.make_path(entity))
         except TypeError:  # a text, a dimension, a point
@@ -147,30 +206,38 @@ def _dxf(content: bytes) -> Found:
         for part in path.sub_paths()
         if len(part)
     ]
-    return curves, _left_out(other)
+    return curves, _left_out(other, hidden)
 
 
 def _geojson(content: bytes) -> Found:
-    geometry = shapely.from_geojson(content.decode("utf-8-sig"))
-    curves, other = [], Counter[str]()
-    for part in _all_parts(geometry):
+    drawing = json.loads(content)
+    features = drawing.get("features", [drawing])
+    there = [json.dumps(feature) for feature in features if feature.get("geometry", feature) is not None]
+    curves, other = [], Counter({"Feature without geometry": len(features) - len(there)})
+    for part in _all_parts(shapely.from_geojson(np.array(there, object))):
         if isinstance(part, shapely.Polygon):
             curves += [shapely.get_coordinates(ring) for ring in (part.exterior, *part.interiors)]
         elif isinstance(part, shapely.LineString):
             curves.append(shapely.get_coordinates(part))
         else:
             other[part.geom_type] += 1
-    return curves, _left_out(other)
+    system = str(drawing.get("crs") or "CRS84")
+    geographic = "CRS84" in system or "4326" in system
+    may_be_degrees = curves and geographic and (np.abs(np.concatenate(curves)) <= [180, 90]).all()
+    return curves, [*([DEGREES] if may_be_degrees else []), *_left_out(other, Counter())]
 
 
-def _all_parts(geometry: shapely.Geometry) -> Iterable[shapely.Geometry]:
+def _all_parts(geometry: Any) -> Iterable[shapely.Geometry]:
     for part in shapely.get_parts(geometry):
         yield from _all_parts(part) if hasattr(part, "geoms") else (part,)
 
 
-def _left_out(other: Counter[str]) -> list[str]:
-    names = ", ".join(f"{count} {name}" for name, count in sorted(other.items()))
-    return [f"left out, for they are no curves: {names}"] if names else []
+def _left_out(other: Counter[str], hidden: Counter[str]) -> list[str]:
+    return [
+        f"left out, for {why}: " + ", ".join(f"{count} {name}" for name, count in sorted(found.items()))
+        for why, found in (("they are no curves", +other), ("the drawing does not show them", +hidden))
+        if found
+    ]
 
 
 READERS: dict[str, Callable[[bytes], Found]] = {".svg": _svg, ".dxf": _dxf, ".geojson": _geojson, ".json": _geojson}

@@ -31,6 +31,7 @@ class Mesh(Shape):
     FORMS: ClassVar[str] = "must be a trimesh.Trimesh, or vertices (n, 3) and triangles (m, 3) of their indices"
 
     triangles: str = Field(description="a line `v x y z` a vertex, and `f i j k` a triangle, as in an OBJ file")
+    remark: str = Field(default="", description="what became of the parts of the surface, if it has several")
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Self:
@@ -39,7 +40,7 @@ class Mesh(Shape):
         Raises
         ------
         ConfigError
-            If it holds no closed surface; the message names the file.
+            If it holds no closed surface, or some that overlap; the message names the file.
         """
         trimesh = _library()
         name = printable(os.path.basename(path))
@@ -91,10 +92,11 @@ class Mesh(Shape):
                 "close it in the program that it comes from"
             )
         mesh.fix_normals()
+        remark = _of_one_body(mesh, name)
         lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in mesh.vertices]
         lines += [f"f {i} {j} {k}" for i, j, k in mesh.faces + 1]
         text = "\n".join([*lines, ""])
-        return cls(file=name, sha256=sha256(text), triangles=text)
+        return cls(file=name, sha256=sha256(text), triangles=text, remark=remark)
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
@@ -108,8 +110,8 @@ class Mesh(Shape):
         return _library().load_mesh(StringIO(self.triangles), file_type="obj", process=False)
 
     def __str__(self) -> str:
-        """Return the name of the file and the number of triangles."""
-        return f"{self.file}: {len(self.surface.faces)} triangles"
+        """Return the name of the file, the number of triangles and what is to be said of them."""
+        return "; ".join(filter(None, (f"{self.file}: {len(self.surface.faces)} triangles", self.remark)))
 
     def volume(self, scale: float, angle: float = 0.0) -> Volume:
         """Return the body, its larger extent `scale` [D], turned nose up about its centre of volume, which lies at 0.
@@ -147,6 +149,43 @@ def _library() -> Any:
         raise ConfigError("a mesh needs the packages trimesh and libigl; pip install 'alsph[meshes]'") from None
     del igl
     return trimesh
+
+
+def _of_one_body(mesh: Any, name: str) -> str:
+    """Take the shells out of a mesh that lie within others, and return what is to be said of those that it has.
+
+    Raises
+    ------
+    ConfigError
+        If shells overlap.
+    """
+    import igl
+    from igl.predicates import find_self_intersections
+
+    shells = _library().graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
+    firsts = np.unique(shells, return_index=True)[1]
+    if len(firsts) == 1:
+        return ""
+    vertices, triangles = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
+    pairs = find_self_intersections(vertices, triangles)[1]
+    overlapping = pairs[shells[pairs[:, 0]] != shells[pairs[:, 1]]]
+    if len(overlapping):
+        one, two = sorted(shells[overlapping[0]] + 1)
+        x, y, z = mesh.triangles_center[overlapping[0, 0]]
+        raise ConfigError(
+            f"{name}: its shells {one} and {two} overlap near ({x:.4g}, {y:.4g}, {z:.4g}); unite them in the program "
+            "that made it, e.g. by a boolean union"
+        )
+    outside = mesh.triangles_center[firsts] + 1e-6 * mesh.extents.max() * mesh.face_normals[firsts]
+    within = igl.winding_number(vertices, triangles, outside) > 0.5
+    mesh.update_faces(~within[shells])
+    mesh.remove_unreferenced_vertices()
+    filled, apart = np.count_nonzero(within), np.count_nonzero(~within)
+    remarks = [
+        f"{filled} of its {len(firsts)} shells, within others, left out: the body is solid there, without a cavity",
+        f"its {apart} shells, apart from each other, are one body: drag and lift are those of all of them together",
+    ]
+    return "; ".join(remark for remark, holds in zip(remarks, (filled, apart > 1), strict=True) if holds)
 
 
 def _nearest(vertices: FloatArray, triangles: NDArray[np.int64], points: FloatArray) -> tuple[FloatArray, FloatArray]:
