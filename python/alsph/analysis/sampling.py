@@ -331,7 +331,7 @@ def control_volume(
     dimensions = len(lower)
     fields = np.column_stack([velocity, pressure])
     surface = np.zeros(dimensions)
-    for axis, sign, points, area in _faces(lower, upper, spacing):
+    for axis, sign, points, area in faces(lower, upper, spacing):
         value, gradient = interpolate(position, fields, points, spacing)
         face_velocity, face_pressure = value[:, :dimensions], value[:, dimensions]
         rate = gradient[:, :dimensions, :]
@@ -345,7 +345,7 @@ def control_volume(
     return surface if body_force is None else surface + mass @ body_force, mass @ velocity
 
 
-def _faces(lower: FloatArray, upper: FloatArray, spacing: float) -> Iterator[tuple[int, int, FloatArray, float]]:
+def faces(lower: FloatArray, upper: FloatArray, spacing: float) -> Iterator[tuple[int, int, FloatArray, float]]:
     """Yield the faces of a box: axis and sign of the outward normal, midpoints (m, d) of its tiles, area of a tile."""
     counts = np.ceil((upper - lower) / spacing).astype(int)
     steps = (upper - lower) / counts

@@ -117,7 +117,12 @@ def _whole_periods(
     amplitudes = cycle_amplitudes(time, lift, edges)
     average = float(amplitudes.mean())
     growth = uncertainty_of_mean(amplitudes, average)
-    trends = {"drag": _drift(time, drag, edges), "lift amplitude": drift_of(amplitudes, average)}
+    periods = np.diff(edges)
+    trends = {
+        "drag": _drift(time, drag, edges),
+        "lift amplitude": drift_of(amplitudes, average),
+        "shedding period": drift_of(periods, float(periods.mean())),
+    }
     growing = growth.change > FAST_GROWTH * average and bool(np.isinf(growth.standard))
     return Window(edges, len(edges) - 1, settled, with_trends(rule, trends), growing)
 
@@ -168,6 +173,8 @@ def _shedding(time: FloatArray, drag: FloatArray, lift: FloatArray, thickness: f
     none = np.empty(0)
     if np.isnan(lift).all():
         return none, "no lift"
+    if odd := np.count_nonzero(~(np.isfinite(lift) & np.isfinite(drag))):
+        return none, f"in {odd} of {len(lift)} steps drag or lift is no number"
     late = time >= 0.5 * (time[0] + time[-1])
     spread = float(lift[late].std())
     if not spread > SMALLEST_LIFT * float(np.sqrt((drag[late] ** 2).mean())):

@@ -64,14 +64,28 @@ def widen(path: Path, columns: list[str]) -> None:
 
 
 def truncate(path: Path, last: int) -> None:
-    """Keep the complete rows up to a step."""
+    """Keep the rows up to a step, without a last one that was cut.
+
+    Raises
+    ------
+    ValueError
+        If a step is missing, or stands there twice.
+    """
     with path.open("rb") as file, replacing(path) as new_path:
         header = next(file, b"")
         if header and not _names_columns(header):
             raise ValueError("its first line does not name its columns")
         with new_path.open("wb") as new:
             new.write(header)
+            due, torn = None, False
             for row in file:
+                if torn:
+                    raise ValueError("a line before its last is no row of numbers")
                 number = row.split(b",")[0] if row.count(b",") == header.count(b",") and row.endswith(b"\n") else b""
-                if number.isdigit() and int(number) <= last:
+                if torn := not number.isdigit():
+                    continue
+                if due is not None and int(number) != due:
+                    raise ValueError(f"step {int(number)} stands where step {due} should")
+                due = int(number) + 1
+                if int(number) <= last:
                     new.write(row)

@@ -254,9 +254,17 @@ class Fields:
         -------
         ndarray, shape (d,)
             Averaged over the snapshots in the averaging window; NaN if there are fewer than two.
+
+        Raises
+        ------
+        ConfigError
+            If the box reaches out of the domain, or its faces go through a body in one of the snapshots.
         """
         times = self.times[(self.times >= self.window.start) & (self.times <= self.window.end)]
-        box = checked_box(lower, upper, self.config.case.space_dimensions)
+        box, domain = checked_box(lower, upper, self.config.case.space_dimensions), self.config.case.checked_domain
+        if not domain.contains(np.array(box), 1e-9).all():
+            whole = f"{list(domain.lower)} to {list(domain.upper)}"
+            raise ConfigError(f"box from {lower} to {upper}: reaches out of the domain, {whole} [D]")
         if len(times) < 2:
             return np.full(len(lower), np.nan)
         balances = [self._box_balance(self.snapshot(time), box) for time in times]
@@ -266,7 +274,11 @@ class Fields:
         return np.asarray(2.0 * force / self.config.case.reference_area)
 
     def _box_balance(self, snapshot: Snapshot, box: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
-        fluid = snapshot.fluid
+        fluid, points = snapshot.fluid, np.concatenate([face[2] for face in sampling.faces(*box, self.spacing)])
+        crossing = points[sampling.in_solid(snapshot.position, fluid, points)]
+        if len(crossing):
+            where, time = ", ".join(f"{x:.3g}" for x in crossing[0]), f"tU/D = {snapshot.time:.4g}"
+            raise ConfigError(f"box: at {time} a face goes through a body at ({where}); all must lie in the fluid")
         viscosity = self.config.case.kinematic_viscosity
         fields = snapshot.position[fluid], snapshot.velocity[fluid], snapshot.pressure[fluid]
         force = self.config.case.body_force_at(fields[0], snapshot.time)

@@ -96,6 +96,7 @@ def repeat(path: str | Path, threads: int | None = None, *, progress: bool = Tru
         raise RunFolderError(f"{path}: {recorded.name} is missing, with which the repetition is compared")
     with recorded.open(encoding="utf-8", errors="replace") as file, Reporter(until, 0.0, enabled=progress) as reporter:
         names = next(file, "").rstrip().split(",")
+        unknown = set(names) - {"step", "time"}
         ends = [*(step for step, _ in parts[1:]), int(info["checkpoint"]["step"])]
         for (_, part), end in zip(parts, ends, strict=True):
             if simulation.step:
@@ -105,7 +106,7 @@ def repeat(path: str | Path, threads: int | None = None, *, progress: bool = Tru
                 rows = simulation.new_history(keep=False)
                 reporter.update(rows)
                 for now in lines(flatten(rows, bodies)):
-                    unequal = unequal or _difference(names, next(file, ""), now)
+                    unequal = unequal or _difference(names, next(file, ""), now, unknown)
     return Repetition(
         steps=simulation.step,
         same_state=checkpoint.digest(simulation.state()) == info["checkpoint"]["state_sha256"],
@@ -152,17 +153,19 @@ def _case(tables: Any, settings: RunSettings, folder: RunFolder) -> Config:
         raise RunFolderError(f"{folder.path}/run.json: the case of a segment cannot be used: {error}") from None
 
 
-def _difference(names: list[str], then: str, now: dict[str, str]) -> str:
+def _difference(names: list[str], then: str, now: dict[str, str], unknown: set[str]) -> str:
     """Say where a row of the history differs from the line that was recorded, or return nothing.
 
-    What an older alsph did not record is not compared.
+    What an older alsph did not record is not compared: columns that are not there, and those that are `unknown` up to
+    here and in this row, which stay in that set.
     """
     recorded = then.rstrip("\n").split(",")
     if len(recorded) != len(names) or "step" not in names:
         return f"step {now['step']}: not in the recorded history"
     was = dict(zip(names, recorded, strict=True))
+    unknown.intersection_update(name for name, text in was.items() if text == UNKNOWN)
     for name, value in now.items():
-        if was.get(name, UNKNOWN) in (value, UNKNOWN):
+        if name in unknown or was.get(name, value) == value:
             continue
         try:
             change = f" (by {abs(float(value) - float(was[name])):.3g})"

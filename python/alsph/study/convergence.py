@@ -186,7 +186,7 @@ class Report:
         rows = [
             [
                 found.name,
-                *(str(value) if _uncertainty(value) else f"{value:.5g}{remark(value)}" for value in found.values),
+                *(str(v) if 0 < _uncertainty(v) < np.inf else f"{v:.5g}{remark(v)}" for v in found.values),
                 found.kind,
                 _shown(found.order, ".2f"),
                 _shown(found.richardson, ".5g"),
