@@ -17,6 +17,7 @@ from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.channel import Channel
 from alsph.errors import ConfigError
+from alsph.geometry.domain import SolidBody
 from alsph.geometry.lattice import inside
 from alsph.geometry.outline import Outline
 from alsph.geometry.packing import Planar, height_over, pack_around
@@ -106,6 +107,16 @@ class Bodies(Channel):
         left, bottom, right, top = shapely.bounds(self.outlines).T
         middles = np.stack([left + right, bottom + top], axis=1) / 2 + self.centre
         return dict(zip(self.coefficient_bodies, middles, strict=True))
+
+    def bodies(self) -> list[SolidBody]:
+        """Return the bodies, at rest; torques on one are about the centre, on each of several about its middle."""
+        middles = self.middles()
+        return [SolidBody(name, tuple(middles.get(name, self.centre))) for name in self.coefficient_bodies]
+
+    @property
+    def moment_point(self) -> FloatArray:
+        """Point (2,) that moments are about if no other is given [D]: of several bodies (upstream, body_offset)."""
+        return self.centre if self.middles() else super().moment_point
 
     @cached_property
     def _refusal(self) -> str:

@@ -17,6 +17,7 @@ from alsph.arrays import Arrays, FloatArray
 from alsph.cases import remarks
 from alsph.cases.base import Case
 from alsph.cases.duct import parabola
+from alsph.errors import ConfigError
 from alsph.geometry.domain import Boundary, Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, lattice, symmetric_centres
 from alsph.geometry.particles import Kind, join, particles
@@ -88,6 +89,14 @@ class Channel(Case):
                 )
         for name in ("length", *self.across):
             self.whole_cells(name, getattr(self, name))
+        return self
+
+    @model_validator(mode="after")
+    def _bodies_are_named(self) -> Self:
+        names, known = [body.name for body in self.checked_bodies], self.coefficient_bodies
+        if names[: len(known)] != known:
+            told = f"has {', '.join(names) or 'none'}, and must begin with {', '.join(known)}"
+            raise ConfigError(f"{type(self).__name__}.bodies(): {told}, the order of their solid particles")
         return self
 
     @property
