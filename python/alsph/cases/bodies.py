@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 import shapely
-from pydantic import model_validator
 from shapely import LineString
 
 from alsph.analysis.measures import Measure, Profile
@@ -51,32 +50,6 @@ class Bodies(Channel):
         except ConfigError as error:
             raise ConfigError(f"{type(self).__name__}.shapes() {error}") from None
         return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
-
-    @model_validator(mode="after")
-    def _fits_in(self) -> Self:
-        left, bottom, right, top = self.outline.bounds
-        _, lifted = self.centre
-        below, above = self.height / 2 + lifted, self.height / 2 - lifted
-        rooms = {
-            ("inlet", "upstream"): self.upstream + left,
-            ("outlet", "length"): self.length - self.upstream - right,
-            ("lower side", "height"): bottom + below,
-            ("upper side", "height"): above - top,
-        }
-        (side, parameter), room = min(rooms.items(), key=lambda item: item[1])
-        if room < 0.5 - 1e-9:
-            one = len(self.outlines) == 1
-            what, come = ("the body", "comes") if one else ("the bodies together", "come")
-            where = f"within {room:.4g} D of" if room >= 0 else f"{-room:.4g} D beyond"
-            size = f"{right - left:.3g} D long and {top - bottom:.3g} D high"
-            remedy = f"leave at least 0.5 D by a larger {parameter}{self._hint}"
-            raise ValueError(f"{what}, {size}, {come} {where} the {side} of the channel; {remedy}")
-        return self
-
-    @property
-    def _hint(self) -> str:
-        """What else may help where the bodies do not fit in."""
-        return ""
 
     @property
     def outlines(self) -> list[shapely.Polygon]:
