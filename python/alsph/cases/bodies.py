@@ -184,9 +184,14 @@ class Bodies(Channel):
             for remark in remarks.thin(name, outline, left, self.particle_spacing)
         ]
         near = remarks.gaps(self.coefficient_bodies, self.carried, self.particle_spacing)
+        slots = [
+            remark
+            for name, left in zip(self.coefficient_bodies, self.carried, strict=True)
+            for remark in remarks.slots(name, left, self.particle_spacing)
+        ]
         pockets = remarks.holes(self.outlines, self.carried)
         several = remarks.several(self.coefficient_bodies)
-        return [*super().remarks(), *several, *thin, *near, *pockets, *remarks.unknown(bool(several))]
+        return [*super().remarks(), *several, *thin, *near, *slots, *pockets, *remarks.unknown(bool(several))]
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces on all bodies together, the Strouhal number, and the mean forces on each of several."""
