@@ -25,7 +25,8 @@ from alsph.geometry.domain import SolidBody
 from alsph.geometry.particles import Kind
 from alsph.geometry.rigid import Rigid
 from alsph.results.ledger import _wall_power as ledger_power
-from alsph.running.outputs import SurfacePressure
+from alsph.run_settings import RunSettings
+from alsph.running.outputs import SurfacePressure, remarks_of
 from alsph.study.declaration import digest
 from scipy.spatial.transform import Rotation
 
@@ -183,6 +184,25 @@ def test_torques_on_several_bodies_are_about_their_own_middles_and_moments_about
         assert force > 0.3 and abs(torque) < 0.02 * force  # pressure goes through the centre of a circle
         moment = run.moment_coefficient(part="pressure", body=name)[-1]
         assert moment == pytest.approx(-2 * (torque - arm * force))
+
+
+def test_the_outlet_is_as_near_as_a_body_comes_to_it():
+    def said(case, until):
+        found = remarks_of(Config(case, RunSettings(until=until)), {"kind": np.zeros(0)})
+        return [remark.partition(";")[0] for remark in found if "outlet" in remark]
+
+    case = Cylinder(resolution=8, length=8, height=12, upstream=3, body_motion="2*t, 0")
+    assert said(case, 0.9) == [] == said(case.replace(body_motion="-2*t, 0"), 1.9)
+    assert said(case, 1.9) == ["short channel: outlet 0.7 D behind the body at t* = 1.9"]
+    assert said(case.replace(body_motion="cos(pi*t), 0"), 10) == []  # from where it begins, upstream
+    swings = case.replace(body_motion="3*sin(pi*t/4), 0")
+    assert said(swings, 8) == ["short channel: outlet 1.5 D behind the body at t* = 2"]
+    assert said(case.replace(length=5.5), 0.2) == ["short channel: outlet 2 D behind the body"]
+    pair = Body(**PAIR | {"length": 9.5})
+    assert said(pair.replace(body_motion="t*(x < 3.5), 0"), 0.9) == []
+    assert said(pair.replace(body_motion="t*(x > 3.5), 0"), 1.6) == [
+        "short channel: outlet 2.4 D behind the body at t* = 1.6"
+    ]
 
 
 def test_runs_with_another_motion_are_other_runs():

@@ -148,6 +148,10 @@ class Bodies(Channel):
         return float((upper - lower).max(axis=1).min())
 
     @property
+    def _backs(self) -> list[float]:
+        return [float(right) for *_, right, _ in shapely.bounds(self.outlines)]
+
+    @property
     def blocked(self) -> float:
         """How much of the channel's height the bodies block, what stands behind another but once [D]."""
         sides = [LineString([(0, bottom), (0, top)]) for _, bottom, _, top in shapely.bounds(self.outlines)]

@@ -17,6 +17,7 @@ from alsph.arrays import Arrays, FloatArray
 from alsph.cases import remarks
 from alsph.cases.base import Case
 from alsph.cases.duct import parabola
+from alsph.engine.prescribed import asked
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Boundary, Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, lattice, symmetric_centres
@@ -180,10 +181,31 @@ class Channel(Case):
 
     def remarks(self) -> list[str]:
         """Return what is to be said of the resolution, the method and the channel."""
-        behind = self.length - self.upstream - self.bounds[2]
         # Who asks for sides that hold the fluid wants them near.
         near = (0.0, 0.0) if self.is_confined else (self.blockage, self.slowed)
-        return [*super().remarks(), *remarks.channel(self.blocked, self.ahead, behind, *near)]
+        return [*super().remarks(), *remarks.channel(self.blocked, self.ahead, self._behind, *near)]
+
+    def remarks_until(self, until: float) -> list[str]:
+        """Return what is to be said besides of where ``body_motion`` takes the bodies up to a time [D/U]."""
+        if self.body_motion is None or remarks.near_outlet(self.blocked, self._behind):
+            return []
+        backs = dict(zip(self.coefficient_bodies, self._backs, strict=True))
+        moved = np.array([backs.get(name, -math.inf) for name in self.moved_bodies])
+        times = np.linspace(0, until, 101)
+        way = np.array([asked("motion", self.motion, self.moved_centres, time) for time in times])[..., 0]
+        outlet = self.length - self.upstream - (moved + way - way[0]).max(axis=1)
+        nearest = int(outlet.argmin())
+        return remarks.near_outlet(self.blocked, float(outlet[nearest]), f" at t* = {times[nearest]:.4g}")
+
+    @property
+    def _backs(self) -> list[float]:
+        """How far each body reaches behind the centre [D]."""
+        return [self.bounds[2]]
+
+    @property
+    def _behind(self) -> float:
+        """Distance from the back of the bodies to the outlet [D]."""
+        return self.length - self.upstream - self.bounds[2]
 
     @property
     def ahead(self) -> float:

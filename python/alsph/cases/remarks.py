@@ -181,10 +181,7 @@ def channel(size: float, inlet: float, outlet: float, share: float, slowed: floa
     slowed : float
         Share by which it slows the stream at the inlet.
     """
-    remarks = []
-    if outlet < OUTLET * size:
-        text = f"outlet {outlet:.3g} D behind the body; vortices leave as they form, and may not form at all"
-        remarks.append(f"short channel: {text}, use a larger length")
+    remarks = near_outlet(size, outlet)
     if slowed > SLOWED:
         text = f"inlet {inlet:.3g} D before the body, which slows the stream there by about {100 * slowed:.0f} %"
         remarks.append(f"short channel: {text}; the inflow is uniform all the same, use a larger upstream")
@@ -192,6 +189,14 @@ def channel(size: float, inlet: float, outlet: float, share: float, slowed: floa
         text = f"the body blocks {100 * share:.0f} % of it; its coefficients are not those of unbounded flow"
         remarks.append(f"narrow channel: {text}")
     return remarks
+
+
+def near_outlet(size: float, outlet: float, when: str = "") -> list[str]:
+    """Remark on an outlet too near the back of a body of that size across the stream, then [D]."""
+    if not outlet < OUTLET * size:
+        return []
+    text = f"outlet {outlet:.3g} D behind the body{when}; vortices leave as they form, and may not form at all"
+    return [f"short channel: {text}, use a larger length"]
 
 
 def protrusion(shape: Polygon | MultiPolygon, thickness: float) -> float:
