@@ -3,12 +3,15 @@
 import dataclasses
 import functools
 import os
+import re
 import subprocess
 import sys
 import warnings
 
+import alsph
 import numpy as np
 import pytest
+import shapely
 from alsph import cases, config, open_run
 from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind
@@ -346,3 +349,23 @@ def test_velocities_of_solid_particles_that_are_not_used_are_warned_of():
     kept.advance(1)
     state = kept.state()
     assert np.allclose(state["velocity"][state["kind"] == Kind.SOLID], [0.25, 0.0])
+
+
+class Two(cases.Bodies):
+    """Two squares, of which a list tells the names."""
+
+    called: list[str] = ["body_1", "body_2"]
+
+    def shapes(self):
+        return [shapely.box(x, -0.5, x + 1, 0.5) for x in (-1.5, 0.5)]
+
+    def bodies(self):
+        return [alsph.SolidBody(name, self.centre) for name in self.called]
+
+
+@pytest.mark.parametrize("names", [["body_2", "body_1"], ["body_1"], ["hull", "rudder"], []])
+def test_bodies_must_be_called_as_their_loads_are(names):
+    told = f"Two.bodies(): has {', '.join(names) or 'none'}, and must begin with body_1, body_2"
+    with pytest.raises(ConfigError, match=re.escape(told)):
+        Two(called=names)
+    assert Two(called=["body_1", "body_2", "mast"]).checked_bodies[2].name == "mast"

@@ -6,10 +6,13 @@ from pathlib import Path
 import alsph
 import numpy as np
 import pytest
+import shapely
 from alsph import cases
 from alsph.cases import (
+    Body,
     ConcentricRelease,
     Cylinder,
+    CylinderPair,
     OscillatingCylinder,
     RotatingCylinder,
     SettlingSphere,
@@ -22,7 +25,8 @@ from alsph.geometry.domain import SolidBody
 from alsph.geometry.particles import Kind
 from alsph.geometry.rigid import Rigid
 from alsph.results.ledger import _wall_power as ledger_power
-from alsph.running.outputs import SurfacePressure
+from alsph.run_settings import RunSettings
+from alsph.running.outputs import SurfacePressure, remarks_of
 from alsph.study.declaration import digest
 from scipy.spatial.transform import Rotation
 
@@ -152,6 +156,53 @@ def test_a_body_that_comes_to_a_side_is_told_of():
     case = Cylinder(**SMALL, body_motion="0, t")
     with pytest.raises(SolverError, match='keep "cylinder" some spacings away from sides and other bodies'):
         case.simulation(threads=2).run_until(2)
+
+
+TWO = shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(3, 0, 4, 1)])
+PAIR = {"shape": TWO, "resolution": 8, "length": 9.0, "height": 5.0, "upstream": 3.5, "perturbation": 0.0}
+
+
+def test_several_bodies_are_told_apart_and_turn_about_their_own_middles():
+    case = Body(**PAIR, body_motion="0.5*t*(x > 3.5), 0.3*t*(x < 3.5), 2*t*(x < 3.5)")
+    assert case.moved_centres.tolist() == [[2.0, 0.0], [5.0, 0.0]]
+    simulation = case.simulation(threads=1)
+    simulation.run_until(0.2)
+    time, state, rows = simulation.time, simulation.state(), simulation.history()
+    assert rows["displacement"][-1] == pytest.approx(np.array([[0, 0.3], [0.5, 0]]) * time)
+    assert rows["angle"][-1, :, 0] == pytest.approx([2 * time, 0])
+    for body, middle in enumerate([(2, 0.3 * time), (5 + 0.5 * time, 0)]):
+        solid = (state["kind"] == Kind.SOLID) & (state["body"] == body)
+        assert state["position"][solid].mean(axis=0) == pytest.approx(middle, abs=1e-6)
+
+
+def test_torques_on_several_bodies_are_about_their_own_middles_and_moments_about_the_common_one(tmp_path):
+    case = CylinderPair(resolution=8, length=9, height=8, upstream=3, body_offset=0.25)
+    assert case.moment_point.tolist() == [3.0, 0.25] and Cylinder(**SMALL).moment_point.tolist() == [2.0, 0.0]
+    run = case.run(tmp_path / "run", until=0.2, progress=False)
+    for name, arm in (("body_1", -1.5), ("body_2", 1.5)):
+        force, torque = (run.history[f"{name}_pressure_{kind}"][-1] for kind in ("force_x", "torque"))
+        assert force > 0.3 and abs(torque) < 0.02 * force  # pressure goes through the centre of a circle
+        moment = run.moment_coefficient(part="pressure", body=name)[-1]
+        assert moment == pytest.approx(-2 * (torque - arm * force))
+
+
+def test_the_outlet_is_as_near_as_a_body_comes_to_it():
+    def said(case, until):
+        found = remarks_of(Config(case, RunSettings(until=until)), {"kind": np.zeros(0)})
+        return [remark.partition(";")[0] for remark in found if "outlet" in remark]
+
+    case = Cylinder(resolution=8, length=8, height=12, upstream=3, body_motion="2*t, 0")
+    assert said(case, 0.9) == [] == said(case.replace(body_motion="-2*t, 0"), 1.9)
+    assert said(case, 1.9) == ["short channel: outlet 0.7 D behind the body at t* = 1.9"]
+    assert said(case.replace(body_motion="cos(pi*t), 0"), 10) == []  # from where it begins, upstream
+    swings = case.replace(body_motion="3*sin(pi*t/4), 0")
+    assert said(swings, 8) == ["short channel: outlet 1.5 D behind the body at t* = 2"]
+    assert said(case.replace(length=5.5), 0.2) == ["short channel: outlet 2 D behind the body"]
+    pair = Body(**PAIR | {"length": 9.5})
+    assert said(pair.replace(body_motion="t*(x < 3.5), 0"), 0.9) == []
+    assert said(pair.replace(body_motion="t*(x > 3.5), 0"), 1.6) == [
+        "short channel: outlet 2.4 D behind the body at t* = 1.6"
+    ]
 
 
 def test_runs_with_another_motion_are_other_runs():

@@ -2,12 +2,13 @@
 
 import gc
 import pickle
+import re
 import weakref
 
 import alsph
 import numpy as np
 import pytest
-from alsph.cases import BackwardFacingStep, Cavity, Couette, Cylinder, Poiseuille, TaylorGreen
+from alsph.cases import BackwardFacingStep, Body, Cavity, Couette, Cylinder, Poiseuille, Sphere, TaylorGreen
 from alsph.engine.prescribed import Prescription, difference
 from alsph.errors import ConfigError
 from alsph.expressions import FUNCTIONS, VectorExpression
@@ -15,6 +16,7 @@ from alsph.geometry.particles import Kind
 from balance import loads
 from hypothesis import given
 from hypothesis import strategies as st
+from shapely import Point
 
 SMALL = {"resolution": 8, "length": 5.0, "height": 4.0, "upstream": 2.0}
 
@@ -332,6 +334,46 @@ def test_what_a_case_does_not_have_cannot_be_prescribed():
         Pulsing(inlet_velocity="1, 0")
     step = BackwardFacingStep(inlet_velocity="1, 0")
     assert step.rules.keys() >= {"inflow"}
+
+
+ROOM = {"resolution": 8, "length": 7.0, "height": 6.0, "upstream": 3.0}
+TURNING = "-2*y, 2*(x - upstream)"
+
+
+@pytest.mark.parametrize(
+    ("case", "told"),
+    [
+        (
+            Body(**ROOM, surface_velocity="1, 0"),
+            "1 U through the surface at (3.5, 0.1875), t* = 0; surfaces slide only",
+        ),
+        (Body(**ROOM, surface_velocity=TURNING), "0.375 U through the surface at (3.5, 0.1875), t* = 0;"),
+        (Cylinder(**ROOM, surface_velocity="-2*y, 2*(x - 4)"), "2 U through the surface at (3, 0.5)"),
+        (
+            Cylinder(**ROOM, surface_velocity="minimum(t, 1), 0"),
+            "U through the surface at (3.495, 0.07116), t* = 37.08",
+        ),
+        (Couette(resolution=10, surface_velocity="0, y"), "1 U through the surface at (0.05, 1), t* = 0"),
+        (Sphere(resolution=8, surface_velocity="-2*y, 2*x, 0"), "U through the surface at (3.0"),
+    ],
+)
+def test_a_surface_slides_only_along_itself(case, told):
+    with pytest.raises(ConfigError, match=f"^surface_velocity = '.*': has a component of .*{re.escape(told)}"):
+        case.build()
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        Cylinder(surface_velocity="-2*y, 2*(x - 4)"),  # of the help
+        Cylinder(**ROOM, surface_velocity=f"sin(t)*{TURNING.replace(', ', ', sin(t)*')}"),
+        Body(**ROOM, shape=Point(0, 0).buffer(0.5, quad_segs=6), surface_velocity=TURNING),
+        Body(**ROOM, surface_velocity="sign(y)*(abs(y) > 0.49), 0"),
+        Cavity(resolution=20, surface_velocity="where(y > 0.999, 1, 0), 0"),
+    ],
+)
+def test_surfaces_that_slide_along_themselves_may_be_of_polygons_and_have_corners(case):
+    assert case.build().state["position"].any()
 
 
 def test_expressions_are_parameters_like_others(tmp_path):

@@ -249,6 +249,62 @@ def test_gaps_that_are_not_resolved():
     assert (Two.name, Two.title) == ("two", "two cylinders side by side")
 
 
+BLOCK = shapely.box(-0.8, -0.6, 0.8, 0.6)
+
+
+def slit(width, depth=1.0):
+    return BLOCK - shapely.box(0.8 - depth, -width / 2, 2, width / 2)
+
+
+def notch(angle):
+    return BLOCK - shapely.Polygon(
+        [(0.1, 0), (1.1, -np.tan(np.radians(angle / 2))), (1.1, np.tan(np.radians(angle / 2)))]
+    )
+
+
+RING = Point(0, 0).buffer(0.8) - Point(0, 0).buffer(0.5)
+ANGLES, RADII = np.arange(10) * np.pi / 5, np.tile([0.5, 0.2], 5)
+STAR = shapely.Polygon(np.stack([RADII * np.cos(ANGLES), RADII * np.sin(ANGLES)], axis=1))
+
+
+@pytest.mark.parametrize(
+    ("shape", "told"),
+    [
+        (slit(0.05), "up to 0.5 Δx within the body; nothing flows there, use a finer resolution"),
+        (slit(0.15), "up to 1.5 Δx within the body; the flow there is not resolved, use a finer resolution"),
+        (slit(0.39), "up to 3.9 Δx within the body; the flow there is not resolved, use a finer resolution"),
+        (
+            slit(0.12) - shapely.box(-2, -0.39, 0, -0.27),
+            "up to 1.2 Δx within the body, the narrowest of 2 slots; the flow",
+        ),
+        (RING - shapely.box(0, -0.1, 2, 0.1), "up to 4 Δx within the body; the flow there is not resolved"),
+        (notch(20), "up to 1.9 Δx within the body; the flow there is not resolved"),
+        (slit(0.41), ""),
+        (slit(0.15, depth=0.2), ""),
+        (notch(45), ""),
+        (RING, ""),
+        (RING - shapely.box(0, -0.25, 2, 0.25), ""),
+        (BLOCK - shapely.box(0, 0, 2, 2), ""),
+        (STAR, ""),
+        (Point(0, 0).buffer(0.5), ""),
+    ],
+)
+def test_a_slot_in_a_body_is_a_gap_that_is_not_resolved(shape, told):
+    found = remarks.slots("body", carried(shape, 0.1), 0.1)
+    assert [remark[: len("narrow gap: " + told)] for remark in found] == ["narrow gap: " + told] * bool(told)
+
+
+def test_slots_are_among_the_remarks_on_bodies():
+    assert "narrow gap" in about(Body(shape=slit(0.15), resolution=10))
+    assert "narrow gap" not in about(Body(shape=slit(0.15), resolution=40))
+
+
+@pytest.mark.parametrize("resolution", [8, 15, 33, 100])
+@pytest.mark.parametrize("name", ["naca0012", "naca6412", "naca23012"])
+def test_airfoils_have_no_slots(name, resolution):
+    assert "narrow gap" not in about(Body(shape=name, angle_of_attack=7, resolution=resolution))
+
+
 def test_a_class_of_the_users_says_what_it_inherits():
     class Slow(Cavity):
         """A slow lid."""

@@ -56,6 +56,25 @@ def test_flow_past_a_cube_goes_on():
     assert np.abs(force[1:]).max() < 0.02 * force[0]
 
 
+@pytest.mark.parametrize(
+    ("told", "room"),
+    [
+        ("4 D high and 4 D wide, comes 0.5 D beyond the lower side of the channel.*larger height", {"scale": 4.0}),
+        ("2.9 D wide, comes within 0.05 D of the lower side.*larger height, or a smaller scale", {"scale": 2.9}),
+        ("comes within 0.4 D of the back of the channel.*larger width", {"scale": 2.2, "height": 6.0, "length": 6.0}),
+        ("comes within 0.3 D of the inlet of the channel.*larger upstream", {"scale": 2.0, "upstream": 1.3}),
+        (
+            "1.41 D high and 1 D wide, comes within 0.2929 D of the upper side",
+            {"body_offset": 0.5, "angle_of_attack": 45.0},
+        ),
+    ],
+)
+def test_a_body_in_space_that_does_not_fit_in_is_refused(told, room):
+    with pytest.raises(ConfigError, match=told):
+        Body3D(**{"length": 4.0, "height": 3.0, "width": 3.0, "upstream": 1.6, "resolution": 8} | room)
+    assert Body3D(**SMALL).fluid_volume() == pytest.approx(9)
+
+
 def test_fluid_around_a_sphere_is_as_much_as_there_is_room_for_and_even():
     spacing = 0.1
     body = sphere(0.5)

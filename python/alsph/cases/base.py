@@ -21,12 +21,14 @@ from alsph.cases.discretised import Discretised
 from alsph.cases.driven import RULES
 from alsph.cases.method import Method
 from alsph.engine.output import Output
+from alsph.engine.prescribed import crossing
 from alsph.engine.problem import Problem
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind
 from alsph.geometry.surface import Surface
 from alsph.parameters import Parameters
+from alsph.text import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -279,11 +281,12 @@ class Case(Discretised):
         Raises
         ------
         ConfigError
-            If the particles would not fit into the memory that is free.
+            If the particles would not fit into the memory that is free, or surfaces would slide through themselves.
         """
         self.check_memory(threads)
         state = self.particles()
         self._warn_of_unused_velocities(state)
+        self._refuse_surfaces_that_let_through(state)
         return self.problem(state)
 
     def draw(self) -> Figure:
@@ -306,6 +309,21 @@ class Case(Discretised):
                 told = f"velocities that particles() gives to those of '{body['name']}' are not used"
                 why = f"bodies() says velocity = {body['velocity']}; say None there to keep them"
                 warnings.warn(f"{type(self).__name__}: the {told}, as {why}", stacklevel=3)
+
+    def _refuse_surfaces_that_let_through(self, state: Arrays) -> None:
+        """Refuse a ``surface_velocity`` through the surface, of which the outermost solid particles tell."""
+        if self.surface_velocity is None:
+            return
+        slides = [body["velocity"] is None and not body["moves"] for body in self.settings()["bodies"]]
+        depth = state["depth"]
+        outermost = (
+            (state["kind"] == Kind.SOLID) & np.array(slides)[state["body"]] & (depth < 0.6 * self.particle_spacing)
+        )
+        normal = state["normal"][outermost]
+        place = state["position"][outermost] + depth[outermost, None] * normal
+        if len(place) > 2 and (found := crossing(self.sliding, place, normal, self.default_until)):
+            remedy = "surfaces slide only along themselves; what moves or turns as a whole has a body_motion"
+            raise ConfigError(self.symbols(f"surface_velocity = {shown(self.surface_velocity)}: has {found}; {remedy}"))
 
     def problem(self, state: dict[str, Any]) -> Problem:
         """Return this case with the given state, for instance one from a checkpoint."""

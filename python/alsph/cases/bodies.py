@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 import shapely
-from pydantic import model_validator
 from shapely import LineString
 
 from alsph.analysis.measures import Measure, Profile
@@ -17,6 +16,7 @@ from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.channel import Channel
 from alsph.errors import ConfigError
+from alsph.geometry.domain import SolidBody
 from alsph.geometry.lattice import inside
 from alsph.geometry.outline import Outline
 from alsph.geometry.packing import Planar, height_over, pack_around
@@ -51,32 +51,6 @@ class Bodies(Channel):
             raise ConfigError(f"{type(self).__name__}.shapes() {error}") from None
         return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
 
-    @model_validator(mode="after")
-    def _fits_in(self) -> Self:
-        left, bottom, right, top = self.outline.bounds
-        _, lifted = self.centre
-        below, above = self.height / 2 + lifted, self.height / 2 - lifted
-        rooms = {
-            ("inlet", "upstream"): self.upstream + left,
-            ("outlet", "length"): self.length - self.upstream - right,
-            ("lower side", "height"): bottom + below,
-            ("upper side", "height"): above - top,
-        }
-        (side, parameter), room = min(rooms.items(), key=lambda item: item[1])
-        if room < 0.5 - 1e-9:
-            one = len(self.outlines) == 1
-            what, come = ("the body", "comes") if one else ("the bodies together", "come")
-            where = f"within {room:.4g} D of" if room >= 0 else f"{-room:.4g} D beyond"
-            size = f"{right - left:.3g} D long and {top - bottom:.3g} D high"
-            remedy = f"leave at least 0.5 D by a larger {parameter}{self._hint}"
-            raise ValueError(f"{what}, {size}, {come} {where} the {side} of the channel; {remedy}")
-        return self
-
-    @property
-    def _hint(self) -> str:
-        """What else may help where the bodies do not fit in."""
-        return ""
-
     @property
     def outlines(self) -> list[shapely.Polygon]:
         """The single bodies of :attr:`outline`."""
@@ -106,6 +80,16 @@ class Bodies(Channel):
         left, bottom, right, top = shapely.bounds(self.outlines).T
         middles = np.stack([left + right, bottom + top], axis=1) / 2 + self.centre
         return dict(zip(self.coefficient_bodies, middles, strict=True))
+
+    def bodies(self) -> list[SolidBody]:
+        """Return the bodies, at rest; torques on one are about the centre, on each of several about its middle."""
+        middles = self.middles()
+        return [SolidBody(name, tuple(middles.get(name, self.centre))) for name in self.coefficient_bodies]
+
+    @property
+    def moment_point(self) -> FloatArray:
+        """Point (2,) that moments are about if no other is given [D]: of several bodies (upstream, body_offset)."""
+        return self.centre if self.middles() else super().moment_point
 
     @cached_property
     def _refusal(self) -> str:
@@ -164,6 +148,10 @@ class Bodies(Channel):
         return float((upper - lower).max(axis=1).min())
 
     @property
+    def _backs(self) -> list[float]:
+        return [float(right) for *_, right, _ in shapely.bounds(self.outlines)]
+
+    @property
     def blocked(self) -> float:
         """How much of the channel's height the bodies block, what stands behind another but once [D]."""
         sides = [LineString([(0, bottom), (0, top)]) for _, bottom, _, top in shapely.bounds(self.outlines)]
@@ -200,9 +188,14 @@ class Bodies(Channel):
             for remark in remarks.thin(name, outline, left, self.particle_spacing)
         ]
         near = remarks.gaps(self.coefficient_bodies, self.carried, self.particle_spacing)
+        slots = [
+            remark
+            for name, left in zip(self.coefficient_bodies, self.carried, strict=True)
+            for remark in remarks.slots(name, left, self.particle_spacing)
+        ]
         pockets = remarks.holes(self.outlines, self.carried)
         several = remarks.several(self.coefficient_bodies)
-        return [*super().remarks(), *several, *thin, *near, *pockets, *remarks.unknown(bool(several))]
+        return [*super().remarks(), *several, *thin, *near, *slots, *pockets, *remarks.unknown(bool(several))]
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces on all bodies together, the Strouhal number, and the mean forces on each of several."""

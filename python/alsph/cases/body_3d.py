@@ -49,6 +49,10 @@ class Body3D(Spatial):
             return Mesh.read(shape)
         return shape if isinstance(shape, Mesh) else Mesh.of(shape)
 
+    @property
+    def _hint(self) -> str:
+        return ", or a smaller scale" if self.scale > 1 else ""
+
     def volume(self) -> Volume:
         """Return the body, turned by the angle of attack."""
         if isinstance(self.shape, Mesh):

@@ -17,6 +17,8 @@ from alsph.arrays import Arrays, FloatArray
 from alsph.cases import remarks
 from alsph.cases.base import Case
 from alsph.cases.duct import parabola
+from alsph.engine.prescribed import asked
+from alsph.errors import ConfigError
 from alsph.geometry.domain import Boundary, Domain, SolidBody
 from alsph.geometry.lattice import cell_centres, lattice, symmetric_centres
 from alsph.geometry.particles import Kind, join, particles
@@ -28,6 +30,12 @@ SIDES = "sides"
 
 CHANNEL = {"reynolds": "Re", "length": "L_over_D", "height": "H_over_D", "upstream": "LU_over_D"}
 """Parameters that the channel of a reference is told by, and their columns."""
+
+BEFORE = ("inlet", "upstream"), ("lower side", "height"), ("back", "width")
+"""What the channel begins with along x, y and z, and the parameter that makes more room there."""
+
+BEHIND = ("outlet", "length"), ("upper side", "height"), ("front", "width")
+"""What it ends with."""
 
 PARABOLA = 1.5
 """Largest velocity of the parabola over its mean."""
@@ -90,6 +98,44 @@ class Channel(Case):
             self.whole_cells(name, getattr(self, name))
         return self
 
+    @model_validator(mode="after")
+    def _fits_in(self) -> Self:
+        lower, upper = (corner + self.centre for corner in self._corners)
+        half = self.section / 2
+        rooms = [
+            *zip(BEFORE, lower - np.append(0.0, -half), strict=False),
+            *zip(BEHIND, np.append(self.length, half) - upper, strict=False),
+        ]
+        (side, parameter), room = min(rooms, key=lambda item: item[1])
+        if room < 0.5 - 1e-9:
+            one = len(self.coefficient_bodies) == 1
+            what, come = (f"the {self.body_name}", "comes") if one else ("the bodies together", "come")
+            where = f"within {room:.4g} D of" if room >= 0 else f"{-room:.4g} D beyond"
+            extents = zip(upper - lower, ("long", "high", "wide"), strict=False)
+            size = " and ".join(f"{extent:.3g} D {way}" for extent, way in extents)
+            remedy = f"leave at least 0.5 D by a larger {parameter}{self._hint}"
+            raise ValueError(f"{what}, {size}, {come} {where} the {side} of the channel; {remedy}")
+        return self
+
+    @model_validator(mode="after")
+    def _bodies_are_named(self) -> Self:
+        names, known = [body.name for body in self.checked_bodies], self.coefficient_bodies
+        if names[: len(known)] != known:
+            told = f"has {', '.join(names) or 'none'}, and must begin with {', '.join(known)}"
+            raise ConfigError(f"{type(self).__name__}.bodies(): {told}, the order of their solid particles")
+        return self
+
+    @property
+    def _corners(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper corner (d,) of a box around all bodies, relative to their centre [D]."""
+        left, bottom, right, top = self.bounds
+        return np.array([left, bottom]), np.array([right, top])
+
+    @property
+    def _hint(self) -> str:
+        """What else may help where the bodies do not fit in."""
+        return ""
+
     @property
     def is_confined(self) -> bool:
         """Whether the sides of the channel do not let slip."""
@@ -135,10 +181,31 @@ class Channel(Case):
 
     def remarks(self) -> list[str]:
         """Return what is to be said of the resolution, the method and the channel."""
-        behind = self.length - self.upstream - self.bounds[2]
         # Who asks for sides that hold the fluid wants them near.
         near = (0.0, 0.0) if self.is_confined else (self.blockage, self.slowed)
-        return [*super().remarks(), *remarks.channel(self.blocked, self.ahead, behind, *near)]
+        return [*super().remarks(), *remarks.channel(self.blocked, self.ahead, self._behind, *near)]
+
+    def remarks_until(self, until: float) -> list[str]:
+        """Return what is to be said besides of where ``body_motion`` takes the bodies up to a time [D/U]."""
+        if self.body_motion is None or remarks.near_outlet(self.blocked, self._behind):
+            return []
+        backs = dict(zip(self.coefficient_bodies, self._backs, strict=True))
+        moved = np.array([backs.get(name, -math.inf) for name in self.moved_bodies])
+        times = np.linspace(0, until, 101)
+        way = np.array([asked("motion", self.motion, self.moved_centres, time) for time in times])[..., 0]
+        outlet = self.length - self.upstream - (moved + way - way[0]).max(axis=1)
+        nearest = int(outlet.argmin())
+        return remarks.near_outlet(self.blocked, float(outlet[nearest]), f" at t* = {times[nearest]:.4g}")
+
+    @property
+    def _backs(self) -> list[float]:
+        """How far each body reaches behind the centre [D]."""
+        return [self.bounds[2]]
+
+    @property
+    def _behind(self) -> float:
+        """Distance from the back of the bodies to the outlet [D]."""
+        return self.length - self.upstream - self.bounds[2]
 
     @property
     def ahead(self) -> float:

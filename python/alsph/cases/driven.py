@@ -46,7 +46,8 @@ class Driven(Dimensional):
     )
     surface_velocity: str | None = Field(
         default=None,
-        description="velocity of the surfaces of bodies in place, by place and time, as '-2*y, 2*(x - 4)' [U]",
+        description="velocity of the surfaces of bodies in place, by place and time, along them, as "
+        "'-2*y, 2*(x - 4)' of a circle about (4, 0) that turns [U]",
     )
 
     body_motion: str | None = Field(

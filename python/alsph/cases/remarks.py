@@ -48,7 +48,13 @@ error)."""
 
 
 CLOSEST = 4.0
-"""Width of a gap between bodies [Δx] below which it is remarked on."""
+"""Width of a gap between bodies, or of a slot in one, [Δx] below which it is remarked on."""
+
+NO_SLOT = 0.05
+"""Area of a notch [Δx²] below which it is roughness."""
+
+DEEP = 2.0
+"""Depth of a slot over its width; a corner of 39 degrees has as much, wider ones have less."""
 
 TOO_THIN = "too thin"
 """What is remarked on a body that the resolution does not carry, and refused."""
@@ -175,10 +181,7 @@ def channel(size: float, inlet: float, outlet: float, share: float, slowed: floa
     slowed : float
         Share by which it slows the stream at the inlet.
     """
-    remarks = []
-    if outlet < OUTLET * size:
-        text = f"outlet {outlet:.3g} D behind the body; vortices leave as they form, and may not form at all"
-        remarks.append(f"short channel: {text}, use a larger length")
+    remarks = near_outlet(size, outlet)
     if slowed > SLOWED:
         text = f"inlet {inlet:.3g} D before the body, which slows the stream there by about {100 * slowed:.0f} %"
         remarks.append(f"short channel: {text}; the inflow is uniform all the same, use a larger upstream")
@@ -186,6 +189,14 @@ def channel(size: float, inlet: float, outlet: float, share: float, slowed: floa
         text = f"the body blocks {100 * share:.0f} % of it; its coefficients are not those of unbounded flow"
         remarks.append(f"narrow channel: {text}")
     return remarks
+
+
+def near_outlet(size: float, outlet: float, when: str = "") -> list[str]:
+    """Remark on an outlet too near the back of a body of that size across the stream, then [D]."""
+    if not outlet < OUTLET * size:
+        return []
+    text = f"outlet {outlet:.3g} D behind the body{when}; vortices leave as they form, and may not form at all"
+    return [f"short channel: {text}, use a larger length"]
 
 
 def protrusion(shape: Polygon | MultiPolygon, thickness: float) -> float:
@@ -351,10 +362,42 @@ def gaps(names: list[str], bodies: list[Polygon | MultiPolygon], spacing: float)
     for first, second in itertools.combinations(range(len(bodies)), 2):
         gap = shapely.distance(bodies[first], bodies[second]) / spacing
         if gap < CLOSEST:
-            through = "nothing flows there" if gap < 1 else "the flow there is not resolved"
-            pair = f"{gap:.2g} Δx between {names[first]} and {names[second]}"
-            found.append(f"narrow gap: {pair}; {through}, use a finer resolution")
+            found.append(_narrow("", gap, f"between {names[first]} and {names[second]}"))
     return found
+
+
+def _narrow(most: str, gap: float, where: str) -> str:
+    through = "nothing flows there" if gap < 1 else "the flow there is not resolved"
+    return f"narrow gap: {most}{gap:.2g} Δx {where}; {through}, use a finer resolution"
+
+
+def slots(name: str, body: Polygon | MultiPolygon, spacing: float) -> list[str]:
+    """Remark on slots in a body so narrow that the flow in them is not resolved (lengths in D).
+
+    They are what a disc of 4 Δx does not come to: deeper than a corner, or between what it comes to.
+    """
+    if body.is_empty:
+        return []
+    radius = 0.5 * CLOSEST * spacing * (1 - 1e-3)
+    outside = shapely.box(*body.bounds).buffer(4 * radius).difference(body)
+    cores = shapely.get_parts(outside.buffer(-radius))
+    reached = shapely.union_all(cores).buffer(radius, quad_segs=32)
+    mouths = reached.buffer(1e-3 * spacing)
+    widths = []
+    for part in shapely.get_parts(outside.difference(reached)):
+        if part.area < NO_SLOT * spacing**2:
+            continue
+        if np.count_nonzero(shapely.distance(cores, part) < 1.01 * radius) > 1:
+            widths.append(CLOSEST)
+            continue
+        corners = shapely.points(shapely.get_coordinates(part))
+        wide, deep = thickness(part), shapely.distance(part.intersection(mouths), corners).max()
+        if deep > max(spacing, DEEP * wide):
+            widths.append(wide / spacing)
+    if not widths:
+        return []
+    several = f", the narrowest of {len(widths)} slots" if len(widths) > 1 else ""
+    return [_narrow("up to ", min(widths), f"within {_the(name)}{several}")]
 
 
 def holes(shapes: Sequence[Polygon], left: Sequence[Polygon | MultiPolygon]) -> list[str]:

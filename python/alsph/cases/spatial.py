@@ -88,8 +88,12 @@ class Spatial(Channel):
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Left, bottom, right and top of the body, relative to its centre [D]."""
-        (left, bottom, _), (right, top, _) = self._volume.corners
+        (left, bottom, _), (right, top, _) = self._corners
         return float(left), float(bottom), float(right), float(top)
+
+    @property
+    def _corners(self) -> tuple[FloatArray, FloatArray]:
+        return self._volume.corners
 
     @property
     def size(self) -> float:

@@ -18,6 +18,7 @@ from alsph.arrays import FloatArray
 from alsph.errors import ConfigError
 from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import lattice
+from alsph.geometry.particles import neighbour_tree
 
 Rule = Callable[[FloatArray, float], ArrayLike | None]
 """Vectors (m, d), or one (d,), from positions (m, d) [D] and the time [D/U].
@@ -41,6 +42,12 @@ KEPT = 256
 
 ROUND_OFF = 1e-9
 """Share of the largest speed below which a velocity out of the domain is none."""
+
+THROUGH = 0.15
+"""Largest component of a velocity through a surface, over the speed; a circle of 24 edges that turns has 0.13."""
+
+FLAT = np.cos(np.radians(40))
+"""Least product of the unit normals of neighbours on a surface; at corners it is not known what is along it."""
 
 SAMPLES = 16
 """Times, and points along each direction of an inlet, at which rules are told apart."""
@@ -207,3 +214,28 @@ def backflow(domain: Domain, position: FloatArray, velocity: FloatArray, time: f
                 "near it, and a breakdown if this lasts"
             )
     return warning
+
+
+def crossing(rule: Rule, place: FloatArray, normal: FloatArray, until: float) -> str:
+    """Say where surfaces would move through themselves at times up to `until` [D/U]; return nothing if they do not.
+
+    Parameters
+    ----------
+    rule
+        Gives the velocity of surfaces [U].
+    place, normal : ndarray, shape (m, d)
+        Places on surfaces [D], at least three, and the unit normals there.
+    until
+        Time [D/U].
+    """
+    _, near = neighbour_tree(place).query(place, k=3)
+    flat = np.einsum("mkd,md->mk", normal[near], normal).min(axis=1) > FLAT
+    place, normal = place[flat], normal[flat]
+    for share in (np.arange(SAMPLES) * 0.618034) % 1:
+        velocity = asked("sliding", rule, place, float(share * until))
+        assert velocity is not None
+        through = np.abs((velocity * normal).sum(axis=1))
+        if through.max(initial=0.0) > THROUGH * np.linalg.norm(velocity, axis=1).max(initial=0.0):
+            where = ", ".join(f"{x:.4g}" for x in place[through.argmax()])
+            return f"a component of {through.max():.3g} U through the surface at ({where}), t* = {share * until:.4g}"
+    return ""

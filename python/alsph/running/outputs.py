@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from alsph.analysis.sampling import in_solid
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
+from alsph.cases.channel import Channel
 from alsph.cases.free_surface import Gauges
 from alsph.config import Config
 from alsph.engine.output import Output
@@ -97,8 +98,10 @@ class SurfacePressure(Samples):
 
 
 def remarks_of(config: Config, state: Mapping[str, Any]) -> list[str]:
-    """Return what is to be said of a run's case and of its probes, given its particles at the start."""
-    return [config.case.symbols(remark) for remark in (*config.case.remarks(), *_in_a_body(config.probes, state))]
+    """Return what is to be said of a run's case, its bodies' way and its probes, given its particles at the start."""
+    case = config.case
+    way = case.remarks_until(config.until) if isinstance(case, Channel) and not config.converges else []
+    return [case.symbols(remark) for remark in (*case.remarks(), *way, *_in_a_body(config.probes, state))]
 
 
 def _in_a_body(probes: FloatArray, state: Mapping[str, Any]) -> list[str]:
