@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,7 +100,7 @@ def grid_convergence(
     unknown = np.nan, np.nan
     if not np.isfinite([coarse, fine]).all():
         return Convergence(name, *known, "unknown", *unknown, np.nan, reference)
-    if fine and abs(fine) <= np.hypot(*map(_uncertainty, known[1][-2:])):
+    if fine and abs(fine) <= math.hypot(*map(_uncertainty, known[1][-2:])):
         return Convergence(name, *known, "within ±", *unknown, np.nan, reference)
     if fine == 0:
         return Convergence(name, *known, "monotonic", *unknown, np.nan, reference)
