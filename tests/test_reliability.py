@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import re
 import resource
 import shutil
 import signal
@@ -381,8 +382,25 @@ def test_a_row_that_cannot_be_read_costs_no_other(tmp_path, small):
     path = small.replace(time_step=0.05).run(tmp_path / "run", until=0.1, progress=False).path
     lines = (path / "history.csv").read_text().splitlines(True)
     (path / "history.csv").write_text("".join([*lines[:5], "nonsense\n", *lines[6:]]))
-    steps = alsph.open_run(resume(path, until=0.2, progress=False).path).history["step"]
-    assert steps[:6].tolist() == [1, 2, 3, 4, 6, 7]
+    run = alsph.open_run(resume(path, until=0.2, progress=False).path)
+    assert run.history["step"][:6].tolist() == [1, 2, 3, 4, 6, 7]
+    assert re.match(r"incomplete: 1 of \d+ steps are missing in the history, the first behind step 4;", run.remarks[0])
+
+
+def test_a_history_whose_times_do_not_increase_is_refused_and_set_aside(tmp_path, small):
+    path = small.replace(time_step=0.05).run(tmp_path / "run", until=0.1, progress=False).path
+    lines = (path / "history.csv").read_text().splitlines(True)
+    unknown = ",".join(["7", "nan", *lines[7].split(",")[2:]])
+    for odd in ([*lines[:6], *lines[4:]], [lines[0], *lines[:0:-1]], [*lines[:7], unknown, *lines[8:]]):
+        (path / "history.csv").write_text("".join(odd))
+        with pytest.raises(
+            RunFolderError, match=r"history.csv: tU/D = \S+ stands behind \S+; the file was edited or dam"
+        ):
+            alsph.open_run(path).summary()
+    assert not alsph.repeat(path, progress=False).same
+    (path / "history.csv").write_text("".join([*lines[:6], *lines[4:]]))
+    with pytest.warns(RuntimeWarning, match="step 4 stands behind step 5.* set aside as history.damaged.csv"):
+        resume(path, until=0.2, progress=False)
 
 
 @pytest.mark.parametrize("name", ["particles.vtkhdf", "run.log", "run.json", "history.csv", ".history.csv.new"])

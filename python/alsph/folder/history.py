@@ -64,12 +64,12 @@ def widen(path: Path, columns: list[str]) -> None:
 
 
 def truncate(path: Path, last: int) -> None:
-    """Keep the rows up to a step, without a last one that was cut.
+    """Keep the rows up to a step, without those that were cut or cannot be read.
 
     Raises
     ------
     ValueError
-        If a step is missing, or stands there twice.
+        If steps do not follow each other.
     """
     with path.open("rb") as file, replacing(path) as new_path:
         header = next(file, b"")
@@ -77,15 +77,13 @@ def truncate(path: Path, last: int) -> None:
             raise ValueError("its first line does not name its columns")
         with new_path.open("wb") as new:
             new.write(header)
-            due, torn = None, False
+            before = 0
             for row in file:
-                if torn:
-                    raise ValueError("a line before its last is no row of numbers")
                 number = row.split(b",")[0] if row.count(b",") == header.count(b",") and row.endswith(b"\n") else b""
-                if torn := not number.isdigit():
+                if not number.isdigit():
                     continue
-                if due is not None and int(number) != due:
-                    raise ValueError(f"step {int(number)} stands where step {due} should")
-                due = int(number) + 1
-                if int(number) <= last:
+                if int(number) <= before:
+                    raise ValueError(f"step {int(number)} stands behind step {before}")
+                before = int(number)
+                if before <= last:
                     new.write(row)

@@ -35,6 +35,7 @@ def outcome(run: Record, until: str) -> list[str]:
         found.append(f"{run.status}: at tU/D = {reached:.4g} of {until}; results are those up to there")
     if retries := run.info.get("retries"):
         found.append(f"retried: broke down {len(retries)} times, went on with smaller time steps")
+    found += missing(run.history)
     if told := [f"at tU/D = {time:.4g} {_told(what)}" for time, what in changes(run)]:
         found.append(f"changed on the way: {'; '.join(told)}; averages may go across it")
     if run.divergence.mean > DIVERGENCE:
@@ -49,6 +50,18 @@ def outcome(run: Record, until: str) -> list[str]:
         if run.drag.mean < 0 and not (has_moved(run.history) or has_surface(run.history)):
             found.append(f"unphysical: mean drag coefficient {run.drag.mean}; a stream drags a body at rest along")
     return found
+
+
+def missing(history: Mapping[str, FloatArray]) -> list[str]:
+    """Remark on steps of which nothing is recorded, in a file that was damaged."""
+    steps = history.get("step", np.empty(0))
+    if not len(steps) or not (lost := int(steps[-1]) - len(steps)):
+        return []
+    first = int(np.argmax(np.diff(steps, prepend=0) > 1))
+    after = f"the first behind step {int(steps[first - 1])}" if first else "the first ones"
+    return [
+        f"incomplete: {lost} of {int(steps[-1])} steps are missing in the history, {after}; averages are without them"
+    ]
 
 
 def changes(run: Record) -> list[tuple[float, dict[str, tuple[Any, Any]]]]:
