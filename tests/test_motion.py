@@ -186,6 +186,18 @@ def test_torques_on_several_bodies_are_about_their_own_middles_and_moments_about
         assert moment == pytest.approx(-2 * (torque - arm * force))
 
 
+def test_several_bodies_that_move_are_drawn_where_they_have_come(tmp_path):
+    """By their particles: the outlines are those of the start."""
+    case = Body(**PAIR, body_motion="t*(x > 3.5), 0")
+    run = case.run(tmp_path / "run", until=0.4, output_interval=0.4, progress=False)
+    assert run.snapshot().solid(np.zeros((1, 2))) is None
+    assert case.replace(body_motion=None).solid_height(np.array([[5.0, 0.0]])) < 0
+    grid = run.to_grid(spacing=0.1)
+    row = grid.fields["pressure"][:, np.abs(grid.axes["y"]).argmin()]
+    filled = grid.axes["x"][np.isnan(row) & (grid.axes["x"] > 3.5)]
+    assert filled.min() == pytest.approx(4.9, abs=0.1) and filled.max() == pytest.approx(5.9, abs=0.1)
+
+
 def test_the_outlet_is_as_near_as_a_body_comes_to_it():
     def said(case, until):
         found = remarks_of(Config(case, RunSettings(until=until)), {"kind": np.zeros(0)})

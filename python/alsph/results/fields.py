@@ -96,11 +96,14 @@ class Fields:
     def _solid_height(self, time: float) -> Callable[[FloatArray], FloatArray | None]:
         """Return what tells how far points lie outside of bodies and walls, :meth:`alsph.cases.Case.solid_height`.
 
-        A body that moves, and is the only one, is taken to where it had come by that time.
+        A body that moves, and is the only one, is taken to where it had come by that time. Of several it is not known
+        which is where, but by their particles.
         """
         case, bodies = self.config.case, self.config.case.checked_bodies
-        if len(bodies) != 1 or not (bodies[0].moves or bodies[0].rigid or "motion" in case.rules):
+        if not ("motion" in case.rules or any(body.moves or body.rigid for body in bodies)):
             return case.solid_height
+        if len(bodies) != 1:
+            return lambda position: None
         history: dict[str, FloatArray] = {}
         with suppress(RunFolderError):  # without it the body is where it begins
             history = self.history
