@@ -192,6 +192,7 @@ def test_several_bodies_that_move_are_drawn_where_they_have_come(tmp_path):
     run = case.run(tmp_path / "run", until=0.4, output_interval=0.4, progress=False)
     assert run.snapshot().solid(np.zeros((1, 2))) is None
     assert case.replace(body_motion=None).solid_height(np.array([[5.0, 0.0]])) < 0
+    assert not any("outlet" in remark for remark in run.remarks)
     grid = run.to_grid(spacing=0.1)
     row = grid.fields["pressure"][:, np.abs(grid.axes["y"]).argmin()]
     filled = grid.axes["x"][np.isnan(row) & (grid.axes["x"] > 3.5)]

@@ -84,6 +84,11 @@ class Config:
         return {"until": self.until}
 
     @property
+    def remarks(self) -> list[str]:
+        """What is to be said of the case, and of where its bodies go up to an end time that is known."""
+        return [*self.case.remarks(), *([] if self.converges else self.case.remarks_until(self.until))]
+
+    @property
     def work(self) -> float:
         """About how many pairs of particles a run goes over: what the time that it takes is proportional to."""
         case = self.case

@@ -246,6 +246,10 @@ class Case(Discretised):
             *remarks.penalty(self.expected_penalty_constant()),
         ]
 
+    def remarks_until(self, until: float) -> list[str]:
+        """Return what is to be said besides of where what moves goes up to a time [D/U]."""
+        return []
+
     @property
     def no_reference(self) -> str:
         """Why references do not hold for these parameters, in words; empty where they do."""

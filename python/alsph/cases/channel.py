@@ -186,7 +186,7 @@ class Channel(Case):
         return [*super().remarks(), *remarks.channel(self.blocked, self.ahead, self._behind, *near)]
 
     def remarks_until(self, until: float) -> list[str]:
-        """Return what is to be said besides of where ``body_motion`` takes the bodies up to a time [D/U]."""
+        """Return what is to be said besides of how near ``body_motion`` takes the bodies to the outlet."""
         if self.body_motion is None or remarks.near_outlet(self.blocked, self._behind):
             return []
         backs = dict(zip(self.coefficient_bodies, self._backs, strict=True))

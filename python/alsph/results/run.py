@@ -150,7 +150,7 @@ class Run(Loads):
             *made(self.measures),
             *self._judged[1],
             *([ELSEWHERE] if goes_on_elsewhere(self, self.config) else []),
-            *case.remarks(),
+            *self.config.remarks,
         ]
         return [self.symbols(remark) for remark in found]
 

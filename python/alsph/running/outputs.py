@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from alsph.analysis.sampling import in_solid
 from alsph.arrays import FloatArray
 from alsph.cases.base import Case
-from alsph.cases.channel import Channel
 from alsph.cases.free_surface import Gauges
 from alsph.config import Config
 from alsph.engine.output import Output
@@ -99,9 +98,7 @@ class SurfacePressure(Samples):
 
 def remarks_of(config: Config, state: Mapping[str, Any]) -> list[str]:
     """Return what is to be said of a run's case, its bodies' way and its probes, given its particles at the start."""
-    case = config.case
-    way = case.remarks_until(config.until) if isinstance(case, Channel) and not config.converges else []
-    return [case.symbols(remark) for remark in (*case.remarks(), *way, *_in_a_body(config.probes, state))]
+    return [config.case.symbols(remark) for remark in (*config.remarks, *_in_a_body(config.probes, state))]
 
 
 def _in_a_body(probes: FloatArray, state: Mapping[str, Any]) -> list[str]:
