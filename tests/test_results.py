@@ -258,8 +258,10 @@ def test_loads_are_those_of_all_bodies_together_or_of_the_first_wall(tmp_path):
         assert run.coefficient("x", "pressure") == pytest.approx(share * drag)
         assert run.coefficient("y", "pressure", names[1]) == pytest.approx(3 * lift)
         if share == 4:  # lifts that act a distance before the point put the nose up
-            behind = np.add(case.bodies()[0].center, (1.5, 0))
-            assert run.moment_coefficient("pressure", about=behind) == pytest.approx(1.5 * share * lift / 2**2)
+            first, second = (body.center for body in case.bodies())
+            behind = np.add(first, (1.5, 0))
+            arms = 1.5 + 3 * (behind - second)[0]
+            assert run.moment_coefficient("pressure", about=behind) == pytest.approx(arms * lift / 2**2)
 
 
 def test_another_reference_area_changes_forces_and_no_moments(folder, monkeypatch):

@@ -137,7 +137,7 @@ def test_particles_on_the_sides_of_a_box_count_in_part():
 
 
 def test_faces_of_a_box_in_tiles():
-    faces = list(sampling._faces(np.array([0.0, 1.0]), np.array([0.45, 1.2]), SPACING))
+    faces = list(sampling.faces(np.array([0.0, 1.0]), np.array([0.45, 1.2]), SPACING))
     assert [(axis, sign) for axis, sign, *_ in faces] == [(0, -1), (0, 1), (1, -1), (1, 1)]
     assert [area for *_, area in faces] == pytest.approx([0.1, 0.1, 0.09, 0.09])
     assert faces[1][2] == pytest.approx(np.array([[0.45, 1.05], [0.45, 1.15]]))

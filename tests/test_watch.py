@@ -216,9 +216,15 @@ def test_watching_keeps_no_run_from_its_folder(path, ask):
     assert set(asked) == {200}
 
 
+def later(row, steps=1):
+    """A row of the history some steps later."""
+    step, time, *rest = row.split(",")
+    return ",".join([str(int(step) + steps), f"{float(time) + 0.01 * steps:.10g}", *rest])
+
+
 def test_rows_that_are_half_written_wait(path, ask):
     steps = ask(path)[1]["progress"]["steps"]
-    whole = (path / "history.csv").read_text().splitlines()[-1]
+    whole = later((path / "history.csv").read_text().splitlines()[-1])
     with (path / "history.csv").open("a") as file:
         file.write(whole[:40])
         file.flush()
@@ -248,7 +254,7 @@ def test_the_history_is_read_as_it_grows(tmp_path, made):
             assert np.array_equal(np.stack([*found.values()], axis=1).reshape(rows.shape), rows, equal_nan=True)
     kept = growing.read()["time"].copy()
     before = growing.read()
-    path.write_bytes(text + lines[-1] * 3)
+    path.write_bytes(text + b"".join(later(lines[-1].decode(), steps).encode() for steps in (1, 2, 3)))
     assert len(growing.read()["time"]) == len(kept) + 3 and np.array_equal(before["time"], kept)
 
 

@@ -53,6 +53,8 @@ class Channel(Case):
     body_name: ClassVar[str]
     across: ClassVar[tuple[str, ...]] = ("height",)
     """Parameters that are the extents of the channel along y, and along z in 3-D."""
+    room: ClassVar[float] = 0.5
+    """Least distance of the bodies from inlet, outlet and sides [D]."""
 
     reynolds: float = Field(default=200.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, gt=0, description="particles per reference length, D/Δx; at least 8 [-]")
@@ -107,13 +109,13 @@ class Channel(Case):
             *zip(BEHIND, np.append(self.length, half) - upper, strict=False),
         ]
         (side, parameter), room = min(rooms, key=lambda item: item[1])
-        if room < 0.5 - 1e-9:
+        if room < self.room - 1e-9:
             one = len(self.coefficient_bodies) == 1
             what, come = (f"the {self.body_name}", "comes") if one else ("the bodies together", "come")
             where = f"within {room:.4g} D of" if room >= 0 else f"{-room:.4g} D beyond"
             extents = zip(upper - lower, ("long", "high", "wide"), strict=False)
             size = " and ".join(f"{extent:.3g} D {way}" for extent, way in extents)
-            remedy = f"leave at least 0.5 D by a larger {parameter}{self._hint}"
+            remedy = f"leave at least {self.room:g} D by a larger {parameter}{self._hint}"
             raise ValueError(f"{what}, {size}, {come} {where} the {side} of the channel; {remedy}")
         return self
 

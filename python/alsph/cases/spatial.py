@@ -31,6 +31,7 @@ class Spatial(Channel):
 
     in_space: ClassVar[int] = 3
     across: ClassVar[tuple[str, ...]] = ("height", "width")
+    room: ClassVar[float] = 0.25
     body_name: ClassVar[str] = "body"
 
     resolution: int = Field(default=10, gt=0, description="particles per reference length, D/Δx; at least 8 [-]")
