@@ -64,8 +64,8 @@ def test_flow_past_a_cube_goes_on():
         ("comes within 0.2 D of the back of the channel.*larger width", {"scale": 2.6, "height": 6.0, "length": 6.0}),
         ("comes within 0.2 D of the inlet of the channel.*larger upstream", {"scale": 2.0, "upstream": 1.2}),
         (
-            "1.41 D high and 1 D wide, comes within 0.1679 D of the upper side",
-            {"body_offset": 0.625, "angle_of_attack": 45.0, "height": 3.25},
+            "1.7 D high and 1.2 D wide, comes within 0.1515 D of the upper side",
+            {"body_offset": 0.5, "angle_of_attack": 45.0, "scale": 1.2},
         ),
     ],
 )
