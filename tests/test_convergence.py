@@ -87,4 +87,6 @@ def test_changes_within_their_uncertainties_tell_no_order():
     found = grid_convergence("mean drag coefficient", [10, 14, 20], values)
     assert found.kind == "within ±" and np.isnan([found.order, found.richardson, found.index]).all()
     sharp = grid_convergence("mean drag coefficient", [10, 14, 20], [Estimate(value, 1e-3) for value in values])
+    values[1] = Estimate(1.50, math.inf)  # which goes on to change, and tells nothing
+    assert grid_convergence("mean drag coefficient", [10, 14, 20], values).kind == "unknown"
     assert sharp.kind == "monotonic" and sharp.order == pytest.approx(2.72, abs=0.01)

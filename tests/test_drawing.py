@@ -375,3 +375,13 @@ def test_features_without_a_geometry_are_left_out(tmp_path):
     assert len(outline.polygons) == 1 and "left out, for they are no curves: 1 Feature without" in outline.remark
     with pytest.raises(ConfigError, match="holds no curves; .*1 Feature without geometry"):
         drawn(tmp_path, "a.geojson", json.dumps(feature(None)))
+
+
+def test_entities_that_are_not_known_are_left_out(tmp_path):
+    """They have no layer."""
+    known = dxf(lambda drawing, space: space.add_circle((1, 1), 4))
+    text = known.decode() if isinstance(known, bytes) else known
+    assert "\nCIRCLE\n" in text
+    text = text.replace("0\nCIRCLE\n", "0\nFOOBAR\n  5\nFFFF\n100\nAcDbFoobar\n  0\nCIRCLE\n", 1)
+    (body,) = drawn(tmp_path, "a.dxf", text.encode() if isinstance(known, bytes) else text).polygons
+    assert body.area == pytest.approx(np.pi / 4, rel=1e-3)

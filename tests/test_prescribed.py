@@ -368,6 +368,7 @@ def test_a_surface_slides_only_along_itself(case, told):
         Cylinder(surface_velocity="-2*y, 2*(x - 4)"),  # of the help
         Cylinder(**ROOM, surface_velocity=f"sin(t)*{TURNING.replace(', ', ', sin(t)*')}"),
         Body(**ROOM, shape=Point(0, 0).buffer(0.5, quad_segs=6), surface_velocity=TURNING),
+        Body(**ROOM, shape=Point(0, 0).buffer(0.5, quad_segs=3), surface_velocity=TURNING),
         Body(**ROOM, surface_velocity="sign(y)*(abs(y) > 0.49), 0"),
         Cavity(resolution=20, surface_velocity="where(y > 0.999, 1, 0), 0"),
     ],

@@ -326,7 +326,9 @@ class Case(Discretised):
         normal = state["normal"][outermost]
         place = state["position"][outermost] + depth[outermost, None] * normal
         if len(place) > 2 and (found := crossing(self.sliding, place, normal, self.default_until)):
-            remedy = "surfaces slide only along themselves; what moves or turns as a whole has a body_motion"
+            remedy = (
+                "surfaces slide only along themselves (a body that moves has a body_motion), or it has too few points"
+            )
             raise ConfigError(self.symbols(f"surface_velocity = {shown(self.surface_velocity)}: has {found}; {remedy}"))
 
     def problem(self, state: dict[str, Any]) -> Problem:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import shapely
+from pydantic import model_validator
 from shapely import LineString
 
 from alsph.analysis.measures import Measure, Profile
@@ -50,6 +51,11 @@ class Bodies(Channel):
         except ConfigError as error:
             raise ConfigError(f"{type(self).__name__}.shapes() {error}") from None
         return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
+
+    @model_validator(mode="after")
+    def _fits_in(self) -> Self:
+        self._check_room()
+        return self
 
     @property
     def outlines(self) -> list[shapely.Polygon]:
@@ -188,14 +194,17 @@ class Bodies(Channel):
             for remark in remarks.thin(name, outline, left, self.particle_spacing)
         ]
         near = remarks.gaps(self.coefficient_bodies, self.carried, self.particle_spacing)
-        slots = [
+        pockets = remarks.holes(self.outlines, self.carried)
+        several = remarks.several(self.coefficient_bodies)
+        return [*super().remarks(), *several, *thin, *near, *self._slots, *pockets, *remarks.unknown(bool(several))]
+
+    @cached_property
+    def _slots(self) -> list[str]:
+        return [
             remark
             for name, left in zip(self.coefficient_bodies, self.carried, strict=True)
             for remark in remarks.slots(name, left, self.particle_spacing)
         ]
-        pockets = remarks.holes(self.outlines, self.carried)
-        several = remarks.several(self.coefficient_bodies)
-        return [*super().remarks(), *several, *thin, *near, *slots, *pockets, *remarks.unknown(bool(several))]
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the forces on all bodies together, the Strouhal number, and the mean forces on each of several."""

@@ -53,9 +53,6 @@ class Channel(Case):
     body_name: ClassVar[str]
     across: ClassVar[tuple[str, ...]] = ("height",)
     """Parameters that are the extents of the channel along y, and along z in 3-D."""
-    room: ClassVar[float] = 0.5
-    """Least distance of the bodies from inlet, outlet and sides [D]."""
-
     reynolds: float = Field(default=200.0, gt=0, description="Reynolds number UD/ν [-]")
     resolution: int = Field(default=20, gt=0, description="particles per reference length, D/Δx; at least 8 [-]")
     length: float = Field(default=14.0, gt=0, description="length of the channel [D]")
@@ -100,8 +97,8 @@ class Channel(Case):
             self.whole_cells(name, getattr(self, name))
         return self
 
-    @model_validator(mode="after")
-    def _fits_in(self) -> Self:
+    def _check_room(self) -> None:
+        """Refuse bodies that come too near to inlet, outlet or sides."""
         lower, upper = (corner + self.centre for corner in self._corners)
         half = self.section / 2
         rooms = [
@@ -116,8 +113,7 @@ class Channel(Case):
             extents = zip(upper - lower, ("long", "high", "wide"), strict=False)
             size = " and ".join(f"{extent:.3g} D {way}" for extent, way in extents)
             remedy = f"leave at least {self.room:g} D by a larger {parameter}{self._hint}"
-            raise ValueError(f"{what}, {size}, {come} {where} the {side} of the channel; {remedy}")
-        return self
+            raise ConfigError(f"{what}, {size}, {come} {where} the {side} of the channel; {remedy}")
 
     @model_validator(mode="after")
     def _bodies_are_named(self) -> Self:
@@ -132,6 +128,11 @@ class Channel(Case):
         """Lower and upper corner (d,) of a box around all bodies, relative to their centre [D]."""
         left, bottom, right, top = self.bounds
         return np.array([left, bottom]), np.array([right, top])
+
+    @property
+    def room(self) -> float:
+        """Least distance of the bodies from inlet, outlet and sides [D]."""
+        return 0.5
 
     @property
     def _hint(self) -> str:

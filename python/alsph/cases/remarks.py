@@ -378,7 +378,7 @@ def slots(name: str, body: Polygon | MultiPolygon, spacing: float) -> list[str]:
     """
     if body.is_empty:
         return []
-    radius = 0.5 * CLOSEST * spacing * (1 - 1e-3)
+    body, radius = body.simplify(0.05 * spacing), 0.5 * CLOSEST * spacing * (1 - 1e-3)
     outside = shapely.box(*body.bounds).buffer(4 * radius).difference(body)
     cores = shapely.get_parts(outside.buffer(-radius))
     reached = shapely.union_all(cores).buffer(radius, quad_segs=32)

@@ -31,7 +31,6 @@ class Spatial(Channel):
 
     in_space: ClassVar[int] = 3
     across: ClassVar[tuple[str, ...]] = ("height", "width")
-    room: ClassVar[float] = 0.25
     body_name: ClassVar[str] = "body"
 
     resolution: int = Field(default=10, gt=0, description="particles per reference length, D/Δx; at least 8 [-]")
@@ -97,6 +96,11 @@ class Spatial(Channel):
         return self._volume.corners
 
     @property
+    def room(self) -> float:
+        """Least distance of the body from inlet, outlet and sides [D]: Δx, which is known when its particles are."""
+        return self.particle_spacing
+
+    @property
     def size(self) -> float:
         """Largest extent of the body [D]."""
         return self._volume.size
@@ -155,6 +159,7 @@ class Spatial(Channel):
 
     def particles(self) -> Arrays:
         """Return a lattice around the body's solid particles, impulsively started."""
+        self._check_room()
         found = super().particles()
         kept = (found["position"][:, 1:] > 0).all(axis=1) if self.quarter else slice(None)
         return {name: values[kept] for name, values in found.items()}

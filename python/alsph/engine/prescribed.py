@@ -43,8 +43,8 @@ KEPT = 256
 ROUND_OFF = 1e-9
 """Share of the largest speed below which a velocity out of the domain is none."""
 
-THROUGH = 0.15
-"""Largest component of a velocity through a surface, over the speed; a circle of 24 edges that turns has 0.13."""
+THROUGH = 0.27
+"""Largest component of a velocity through a surface, over the speed; a circle of 12 edges that turns has 0.26."""
 
 FLAT = np.cos(np.radians(40))
 """Least product of the unit normals of neighbours on a surface; at corners it is not known what is along it."""

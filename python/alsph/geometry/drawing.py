@@ -181,10 +181,10 @@ def _dxf(content: bytes) -> Found:
     off = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_off() or layer.is_frozen()}
 
     def is_hidden(entity: Any) -> bool:
-        block, layer = entity.source_block_reference, entity.dxf.layer.lower()
+        block, layer = entity.source_block_reference, entity.dxf.get("layer", "0").lower()
         within = block is not None and is_hidden(block)
         own = layer in off and (block is None or layer != "0")  # layer 0 of a block is that which the block is put on
-        return bool(entity.dxf.invisible or own or within)
+        return bool(entity.dxf.get("invisible", 0) or own or within)
 
     def shown(entities: Iterable[Any]) -> Iterable[Any]:
         for entity in entities:
@@ -211,7 +211,9 @@ def _dxf(content: bytes) -> Found:
 
 def _geojson(content: bytes) -> Found:
     drawing = json.loads(content)
-    features = drawing.get("features", [drawing])
+    features = drawing.get("features", [drawing]) if isinstance(drawing, dict) else None
+    if not (isinstance(features, list) and all(isinstance(feature, dict) for feature in features)):
+        raise ValueError("it holds no GeoJSON object, or features that are none")
     there = [json.dumps(feature) for feature in features if feature.get("geometry", feature) is not None]
     curves, other = [], Counter({"Feature without geometry": len(features) - len(there)})
     for part in _all_parts(shapely.from_geojson(np.array(there, object))):

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from alsph.arrays import FloatArray
 from alsph.errors import ConfigError
@@ -32,6 +32,11 @@ class Mesh(Shape):
 
     triangles: str = Field(description="a line `v x y z` a vertex, and `f i j k` a triangle, as in an OBJ file")
     remark: str = Field(default="", description="what became of the parts of the surface, if it has several")
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, whole: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out what a mesh of one shell has not, so that it is that of older run folders."""
+        return {name: value for name, value in whole(self).items() if value != ""}
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Self:

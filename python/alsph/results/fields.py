@@ -278,9 +278,11 @@ class Fields:
 
     def _box_balance(self, snapshot: Snapshot, box: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
         fluid, points = snapshot.fluid, np.concatenate([face[2] for face in sampling.faces(*box, self.spacing)])
-        crossing = points[sampling.in_solid(snapshot.position, fluid, points)]
-        if len(crossing):
-            where, time = ", ".join(f"{x:.3g}" for x in crossing[0]), f"tU/D = {snapshot.time:.4g}"
+        domain = self.config.case.checked_domain
+        to_sides = np.minimum(points - domain.lower, np.array(domain.upper) - points).min(axis=1)
+        solid = sampling.in_solid(snapshot.position, fluid, points) & (to_sides > 0.5 * self.spacing)
+        if solid.any():
+            where, time = ", ".join(f"{x:.3g}" for x in points[solid][0]), f"tU/D = {snapshot.time:.4g}"
             raise ConfigError(f"box: at {time} a face goes through a body at ({where}); all must lie in the fluid")
         viscosity = self.config.case.kinematic_viscosity
         fields = snapshot.position[fluid], snapshot.velocity[fluid], snapshot.pressure[fluid]

@@ -80,12 +80,12 @@ def changes(run: Record) -> list[tuple[float, dict[str, tuple[Any, Any]]]]:
 
 
 def _told(changed: Mapping[str, tuple[Any, Any]]) -> str:
-    """Return changes in words; what a table such as an outline holds is too long for any."""
-    words = {
-        name: ["none" if v is None else "a table" if isinstance(v, dict) else shown(v) for v in values]
-        for name, values in changed.items()
-    }
-    return ", ".join(f"{name} {was} -> {became}" for name, (was, became) in words.items())
+    """Return changes in words; of what a table such as an outline holds too much is to be told."""
+    return ", ".join(f"{name} {_brief(was)} -> {_brief(became)}" for name, (was, became) in changed.items())
+
+
+def _brief(value: Any) -> str:
+    return str(value.get("file", "another")) if isinstance(value, dict) else "none" if value is None else shown(value)
 
 
 def has_moved(history: Mapping[str, FloatArray]) -> bool:

@@ -45,7 +45,7 @@ class Convergence:
         The result at each.
     kind : str
         ``monotonic``, ``oscillating`` or ``diverging``: how the last three follow each other; ``within ±`` if the last
-        two differ by no more than their uncertainties, ``unknown`` if one of the three is NaN.
+        two differ by no more than their uncertainties, ``unknown`` if one of these is infinite or a value is NaN.
     order : float
         Observed order p; NaN unless monotonic.
     richardson : float
@@ -100,8 +100,9 @@ def grid_convergence(
     unknown = np.nan, np.nan
     if not np.isfinite([coarse, fine]).all():
         return Convergence(name, *known, "unknown", *unknown, np.nan, reference)
-    if fine and abs(fine) <= math.hypot(*map(_uncertainty, known[1][-2:])):
-        return Convergence(name, *known, "within ±", *unknown, np.nan, reference)
+    apart = math.hypot(*map(_uncertainty, known[1][-2:]))
+    if fine and abs(fine) <= apart:
+        return Convergence(name, *known, "within ±" if apart < np.inf else "unknown", *unknown, np.nan, reference)
     if fine == 0:
         return Convergence(name, *known, "monotonic", *unknown, np.nan, reference)
     ratio, r12, r23 = coarse / fine, n2 / n1, n3 / n2
