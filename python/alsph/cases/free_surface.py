@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 
 from alsph.analysis.energy import PARTS, energy, largest_rise, taken
 from alsph.analysis.measures import Measure
+from alsph.analysis.probes import GaugeRecord
 from alsph.analysis.record import Record
 from alsph.analysis.sampling import pressure_on_walls
 from alsph.arrays import Arrays, FloatArray
@@ -20,7 +21,7 @@ from alsph.cases.base import Case
 from alsph.cases.series import Series, names
 from alsph.engine.prescribed import asked
 from alsph.engine.simulation import Simulation
-from alsph.errors import ConfigError
+from alsph.errors import ConfigError, RunFolderError
 from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Kind, particles
 from alsph.symbols import GENERAL, WATER, Symbols
@@ -121,6 +122,19 @@ class Gauges(Levels):
     def of(cls, case: Case, places: FloatArray) -> Gauges:
         """Return those at places (m, d − 1) of a case."""
         return cls(places, case.checked_domain, case.particle_spacing, case.symbols)
+
+    @classmethod
+    def recorded(cls, run: Record, case: Case, places: FloatArray) -> GaugeRecord:
+        """Return what a run has recorded at places (m, d − 1), :attr:`alsph.Run.gauges`."""
+        if not len(places):
+            return GaugeRecord(places, np.empty(0), np.empty((0, 0)))
+        path = run.path / cls.file
+        try:
+            cls.of(case, places).check(path)
+        except ValueError as error:
+            raise RunFolderError(f"{path}: {error} in case.toml, which is of another run or was changed") from None
+        time, depth = cls.read(run)
+        return GaugeRecord(places, time, depth.T)
 
     def check(self, path: Path) -> None:
         """Refuse a file of other gauges."""

@@ -102,8 +102,11 @@ class Series(ABC):
 
 def names(path: Path) -> list[str]:
     """Return what a file calls its columns; none if there is no file, or no line that names them."""
-    head = _lines(path)[0] if path.exists() else []
-    return head[0].rstrip("\n").split(",") if head else []
+    if not path.exists():
+        return []
+    with path.open(encoding="utf-8") as file:
+        head = file.readline()
+    return head.rstrip("\n").split(",") if head.endswith("\n") and np.isnan(_time(head)) else []
 
 
 def _lines(path: Path) -> tuple[list[str], list[str]]:

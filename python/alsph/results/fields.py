@@ -270,19 +270,23 @@ class Fields:
             raise ConfigError(f"box from {lower} to {upper}: reaches out of the domain, {whole} [D]")
         if len(times) < 2:
             return np.full(len(lower), np.nan)
-        balances = [self._box_balance(self.snapshot(time), box) for time in times]
+        points = np.concatenate([face[2] for face in sampling.faces(*box, self.spacing)])
+        to_sides = np.minimum(points - domain.lower, np.array(domain.upper) - points).min(axis=1)
+        inner = points[to_sides > 0.5 * self.spacing]
+        balances = [self._box_balance(self.snapshot(time), box, inner) for time in times]
         surface, momentum = (np.array(values) for values in zip(*balances, strict=True))
         mean = averages.batch_means(times, surface, times[[0, -1]])[0]
         force = mean - (momentum[-1] - momentum[0]) / (times[-1] - times[0])
         return np.asarray(2.0 * force / self.config.case.reference_area)
 
-    def _box_balance(self, snapshot: Snapshot, box: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
-        fluid, points = snapshot.fluid, np.concatenate([face[2] for face in sampling.faces(*box, self.spacing)])
-        domain = self.config.case.checked_domain
-        to_sides = np.minimum(points - domain.lower, np.array(domain.upper) - points).min(axis=1)
-        solid = sampling.in_solid(snapshot.position, fluid, points) & (to_sides > 0.5 * self.spacing)
-        if solid.any():
-            where, time = ", ".join(f"{x:.3g}" for x in points[solid][0]), f"tU/D = {snapshot.time:.4g}"
+    def _box_balance(
+        self, snapshot: Snapshot, box: tuple[FloatArray, FloatArray], inner: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return force and momentum, given the points of the faces that must lie in the fluid."""
+        fluid = snapshot.fluid
+        crossing = inner[sampling.in_solid(snapshot.position, fluid, inner)]
+        if len(crossing):
+            where, time = ", ".join(f"{x:.3g}" for x in crossing[0]), f"tU/D = {snapshot.time:.4g}"
             raise ConfigError(f"box: at {time} a face goes through a body at ({where}); all must lie in the fluid")
         viscosity = self.config.case.kinematic_viscosity
         fields = snapshot.position[fluid], snapshot.velocity[fluid], snapshot.pressure[fluid]

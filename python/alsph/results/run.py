@@ -114,15 +114,7 @@ class Run(Loads):
         RunFolderError
             If the file is of other gauges than the configuration's.
         """
-        places, path = self.config.gauges, self.path / Gauges.file
-        if not len(places):
-            return GaugeRecord(places, np.empty(0), np.empty((0, 0)))
-        try:
-            Gauges.of(self.config.case, places).check(path)
-        except ValueError as error:
-            raise RunFolderError(f"{path}: {error} in case.toml, which is of another run or was changed") from None
-        time, depth = Gauges.read(self)
-        return GaugeRecord(self.config.gauges, time, depth.T)
+        return Gauges.recorded(self, self.config.case, self.config.gauges)
 
     @cached_property
     def profiles(self) -> list[Profile]:
