@@ -1,6 +1,7 @@
-//! Values of the fluid at any point: quadratic moving least squares.
+//! The pressure that acts, and values of the fluid at any point: quadratic moving least squares.
 
-use crate::base::Vector;
+use crate::base::{Vector, parallel};
+use crate::boundary::shepard;
 use crate::frame::Frame;
 use crate::kernel::{Smoothing, with_kernel};
 use crate::particles::{ParticleKind, Particles};
@@ -10,12 +11,35 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 /// Largest sum of the moduli of the weights of a fit, whose sum is one.
 const LARGEST_AMPLIFICATION: f64 = 8.0;
 
-/// Pressure and velocity at `point` from the fluid around it that is seen from there, exact for quadratic fields, for linear
-/// ones where few particles are near; None where no fluid is near.
+/// The pressure of particles and images: what they keep of it and, of what else pushed the fluid in the last step, the mean over the
+/// kernel's support. Next to walls that alternates from layer to layer, which no gradient sees and no fit can read.
+pub fn smooth_acting_pressure<const D: usize>(
+    settings: &Settings,
+    particles: &Particles<D>,
+    Frame { stencil, images, .. }: &Frame<D>,
+) -> Vec<f64> {
+    let Particles { kind, pressure, unkept_pressure, .. } = particles;
+    let mut acting = pressure.clone();
+    if settings.has_unkept_pressure() {
+        parallel::for_each(images.real(&mut acting), |i, acting| {
+            if kind[i] != ParticleKind::Solid
+                && let Some([mean]) = shepard(settings, stencil, i, |j, _| [unkept_pressure[j]])
+            {
+                *acting += mean;
+            }
+        });
+        images.fill(&mut acting);
+    }
+    acting
+}
+
+/// Pressure and velocity at `point` from the fluid around it that is seen from there, the particles having such a `pressure`: exact for
+/// quadratic fields, for linear ones where few particles are near. None where no fluid is near.
 pub fn interpolate<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
     Frame { grid, faces, .. }: &Frame<D>,
+    pressure: &[f64],
     point: &Vector<D>,
 ) -> Option<(f64, Vector<D>)> {
     if !point.iter().all(|x| x.is_finite()) {
@@ -34,7 +58,7 @@ pub fn interpolate<const D: usize>(
         let seen = |place: &Vector<D>| faces.sight(particles, settings.particle_spacing, &solid, point, place);
         shape_functions(&near, radius, particles, point, |place: &Vector<D>, distance| seen(place) * kernel.value(distance))
     })?;
-    let pressure = near.iter().zip(&weights).map(|(&j, w)| particles.pressure[j] * w).sum();
+    let pressure = near.iter().zip(&weights).map(|(&j, w)| pressure[j] * w).sum();
     let velocity = near.iter().zip(&weights).map(|(&j, w)| particles.velocity[j] * *w).sum();
     Some((pressure, velocity))
 }

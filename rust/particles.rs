@@ -93,6 +93,8 @@ pub struct Particles<const D: usize> {
     pub depth: Vec<f64>,
     /// As the last step found it; all inside where the fluid fills its domain.
     pub place: Vec<Place>,
+    /// What pushed them beside their pressure in the last step, which the pressure does not keep; zero where it keeps all.
+    pub unkept_pressure: Vec<f64>,
     /// No two alike, and the same however the particles are stored; see [`follower`].
     pub id: Vec<u64>,
 }
@@ -103,7 +105,7 @@ macro_rules! each_array {
         each_array!($particles, (&mut) $array, _name => $f)
     };
     ($particles:ident, ($($reference:tt)+) $array:ident, $name:ident => $f:expr) => {
-        each_array!(@ $particles, ($($reference)+) $array, $name => $f; position velocity pressure kind body normal depth place id)
+        each_array!(@ $particles, ($($reference)+) $array, $name => $f; position velocity pressure kind body normal depth place unkept_pressure id)
     };
     (@ $particles:ident, $reference:tt $array:ident, $name:ident => $f:expr; $($field:ident)*) => {
         $(each_array!(@one $particles, $reference $array, $name => $f; $field);)*

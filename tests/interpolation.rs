@@ -2,6 +2,7 @@
 
 use alsph::{Clock, ParticleKind, Particles, Simulation, Vector};
 use approx::assert_relative_eq;
+use serde_json::json;
 
 mod common;
 
@@ -66,6 +67,41 @@ fn sampling_makes_little_of_noise() {
     for disorder in [0.0, 0.3] {
         let values = sampled(noise, 1.0 / 14.0, common::particles(common::lattice::<2>(14, disorder)), &points);
         assert!(values.iter().all(|(p, _)| p.is_nan() || p.abs() < 8.0), "{values:?}");
+    }
+}
+
+/// What pushes beside the pressure counts by its mean: a constant as it is, what alternates from particle to particle not at all, and nothing where
+/// the scheme has none.
+#[test]
+fn the_pressure_that_acts_is_smooth() {
+    let side = 14;
+    let mut particles = common::particles(common::lattice::<2>(side, 0.0));
+    particles.unkept_pressure =
+        particles.position.iter().map(|x| 0.3 + (x.sum() * side as f64).round().rem_euclid(2.0) * 2.0 - 1.0).collect();
+    let points = [[0.5, 0.5], [0.53, 0.31], [0.7, 0.62]].map(Vector::from);
+    let alsph = json!({"kind": "alsph"});
+    let isph =
+        json!({"kind": "isph", "pressure_share": 0.9, "solver": "bicgstab", "tolerance": 1e-6, "max_solver_iterations": 9});
+    let edac = json!({"kind": "edac", "sound_speed": 10, "diffusion_coefficient": 0.5});
+    for (boundary, scheme, expected) in
+        [("none", &alsph, 0.3), ("periodic", &alsph, 0.3), ("slip", &isph, 0.3), ("none", &edac, 0.0)]
+    {
+        let mut settings = common::settings_value::<2>(1.0 / side as f64, boundary);
+        (settings["scheme"], settings["wall_pressure"]) = (scheme.clone(), "linear".into());
+        let mut particles = particles.clone();
+        (0..particles.real).for_each(|i| particles.pressure[i] = linear(&particles.position[i]).0);
+        let settings = common::parse(&settings);
+        let mut simulation = Simulation::new(settings, particles, Clock::default(), Some(2)).expect("valid");
+        for (point, (p, _)) in points.iter().zip(simulation.sample(&points)) {
+            assert_relative_eq!(p, linear(point).0 + expected, epsilon = 0.01);
+        }
+        let snapshot = simulation.snapshot();
+        let particles = simulation.particles();
+        assert_eq!(snapshot.pressure.len(), particles.real);
+        let inside = |i: &usize| particles.position[*i].iter().all(|x| (0.3..0.7).contains(x));
+        for i in (0..particles.real).filter(inside) {
+            assert_relative_eq!(snapshot.pressure[i], particles.pressure[i] + expected, epsilon = 0.01);
+        }
     }
 }
 

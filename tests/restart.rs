@@ -254,6 +254,7 @@ fn particles<const D: usize>(configuration: &Configuration, side: i64, spacing: 
     particles.real = particles.position.len();
     particles.id = (0..particles.real as u64).collect();
     particles.place = vec![Place::Inside; particles.real];
+    particles.unkept_pressure = vec![0.0; particles.real];
     particles
 }
 
@@ -354,7 +355,7 @@ fn body<const D: usize>(configuration: &Configuration, position: &Vector<D>, spa
 }
 
 /// Velocity, pressure and position by id, and the history.
-type Outcome = (Vec<[u64; 7]>, Vec<String>);
+type Outcome = (Vec<[u64; 8]>, Vec<String>);
 
 /// The same particles, stored in another order.
 fn shuffled<const D: usize>(mut particles: Particles<D>, random: &mut Random) -> Particles<D> {
@@ -406,11 +407,12 @@ fn outcome<const D: usize>(
     run().map_err(|error| error.to_string())
 }
 
-fn state<const D: usize>(particles: &Particles<D>) -> Vec<[u64; 7]> {
+fn state<const D: usize>(particles: &Particles<D>) -> Vec<[u64; 8]> {
     let mut order: Vec<usize> = (0..particles.real).collect();
     order.sort_by_key(|&i| particles.id[i]);
     let numbers = |i: usize| {
-        let mut numbers = [particles.pressure[i]; 7];
+        let mut numbers = [particles.pressure[i]; 8];
+        numbers[7] = particles.unkept_pressure[i];
         for axis in 0..D {
             (numbers[axis], numbers[3 + axis]) = (particles.position[i][axis], particles.velocity[i][axis]);
         }

@@ -13,7 +13,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
     "shape, options, start, until, tolerance",
     [
         ("circle", {"resolution": 10}, 0.5, 1.25, 0.03),
-        ("square_cylinder", {"resolution": 10}, 1.0, 2.5, 0.03),
+        ("square_cylinder", {"resolution": 10}, 4.0, 8.0, 0.03),
         ("ellipse_0.4", {"resolution": 12, "angle_of_attack": 15.0}, 0.8, 1.6, 0.03),
         ("plate_0.3", {"resolution": 10}, 0.5, 1.25, 0.03),
         ("wedge_0.4", {"resolution": 12}, 0.8, 1.6, 0.05),

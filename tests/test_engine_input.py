@@ -50,6 +50,8 @@ def changed(**changes):
         ("position", np.full((SIZE, 2), 1e300), "outside 0.0..1.0|outside 0..1"),
         ("velocity", np.full((SIZE, 2), np.inf), "all must be finite"),
         ("pressure", np.zeros(SIZE - 1), f"has {SIZE - 1} entries for {SIZE} positions"),
+        ("unkept_pressure", np.zeros(3), f"has 3 entries for {SIZE} positions"),
+        ("unkept_pressure", np.full(SIZE, np.nan), "unkept_pressure.*of particle 0 is NaN; all must be finite"),
         ("kind", np.full(SIZE, 4, np.uint8), "4 is not 0 fluid"),
         ("kind", np.full(SIZE, 3, np.uint8), "holds no fluid particle"),
         ("kind", np.zeros(SIZE, np.int64), "must be a one-dimensional u8 array"),

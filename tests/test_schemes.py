@@ -6,6 +6,7 @@ import pytest
 from alsph.cases import Cylinder, Sphere, TaylorGreen
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError
+from alsph.geometry.particles import Kind
 from alsph.running.describe import describe
 
 SCHEMES = (
@@ -204,3 +205,31 @@ def test_runs_go_on_and_repeat_to_the_last_bit(chosen, tmp_path, small):
 def test_a_run_says_for_how_long(small):
     longest, shortest = (Config(small.replace(**chosen), RunSettings(until=10)).work for chosen in ({}, SCHEMES[0]))
     assert 1.1 < longest / shortest < 2
+
+
+@pytest.mark.parametrize("options", [{}, {"algorithm": 1}, *ISPH[:1], {"scheme": "edac"}, {"scheme": "wcsph"}])
+def test_the_pressure_that_is_shown_is_what_pushes_smooth(options):
+    case = Cylinder(resolution=8, length=4.0, height=4.0, upstream=2.0, reynolds=100, **options)
+    simulation = case.simulation(threads=1)
+    simulation.advance(25)
+    points = case.surface_points().position
+    sampled, shown, state = simulation.sample(points)["pressure"], simulation.snapshot(), simulation.state()
+    if case.is_weakly_compressible:  # it keeps all of it
+        assert "unkept_pressure" not in state and (shown["pressure"] == state["pressure"]).all()
+        return
+    kept = case.restored({name: value for name, value in state.items() if name != "unkept_pressure"})
+    assert (kept.snapshot()["pressure"] == state["pressure"]).all()
+    # Sums over all particles of the fluid that are not beside the mirrors.
+    position, flows = state["position"], state["kind"] != Kind.SOLID
+    inside = flows & (np.abs(position[:, 1]) < 1.3)
+    q = np.linalg.norm(position[inside, None] - position[flows], axis=2) / case.settings()["particle_spacing"] * 0.75
+    weight = sum(c * np.maximum(k - q, 0) ** 5 for c, k in ((1, 3), (-6, 2), (15, 1)))
+    beside = weight @ state["unkept_pressure"][flows] / weight.sum(axis=1)
+    assert np.abs(beside).max() > 0.01 and not state["unkept_pressure"][~flows].any()
+    assert shown["pressure"][inside] == pytest.approx(state["pressure"][inside] + beside, abs=1e-6)
+    assert (shown["pressure"][~flows] == state["pressure"][~flows]).all()
+    # A sample is a fit of what is shown, and the same of a state that goes on.
+    taken = case.restored(state | {"pressure": shown["pressure"], "unkept_pressure": 0 * state["pressure"]})
+    assert taken.sample(points)["pressure"] == pytest.approx(sampled, abs=1e-12)
+    assert np.abs(sampled - kept.sample(points)["pressure"]).max() > 0.01
+    assert (case.restored(state, threads=2).sample(points)["pressure"] == sampled).all()

@@ -4,7 +4,8 @@
 is; it needs an environment of its own. `compare` starts alsph with that field at t* = 2, when the boundary layers are
 there and the pressure waves of the impulsive start are not, and prints at every half time unit forces, those of the
 reference in brackets, and errors of the velocity within 2 D of the centre; at the end errors at the particles beside
-the cylinder, by layers, 40 to 100 degrees from the front.
+the cylinder, by layers, 40 to 100 degrees from the front, and of the mean C_p on rings around it, with what pushes
+beside p and without.
 
     python -m venv fem && fem/bin/pip install ngsolve scipy
     fem/bin/python benches/reference/cylinder.py solve --until 6 --resolutions 20 30 -o fields.npz
@@ -17,9 +18,13 @@ import argparse
 import itertools
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
+
+if TYPE_CHECKING:
+    from alsph import Simulation
 
 REYNOLDS, LENGTH, HEIGHT, UPSTREAM, RADIUS, PERTURBATION = 200.0, 14.0, 13.0, 4.0, 0.5, 0.1
 START, EVERY = 2.0, 0.5
@@ -28,6 +33,7 @@ RADII, ANGLES = np.linspace(0.502, 1.0, 167), np.radians(np.linspace(-180, 180, 
 NET_FROM, NET_EVERY = 3.0, 0.1
 LAYERS = (0, 1, 2, 3, 4, 6, 8)  # heights over the surface [Δx] between which errors are averaged
 SIDE = np.radians((40, 100))  # from the front
+HEIGHTS = (0.05, 0.5, 1, 2, 3, 4, 6, 8)  # of rings over the surface [Δx]
 
 
 def cell_centres(resolution: int) -> np.ndarray:
@@ -113,7 +119,7 @@ def compare(path: Path, resolution: int, until: float, settings: dict[str, objec
     simulation = Started(resolution=resolution, reynolds=REYNOLDS, **settings).simulation()
     points = comparison_points()
     times, known, net = fields["times"], fields["history"], dict(zip(fields["net_times"], fields["net"], strict=True))
-    beside = []
+    beside, rings = [], []
     print("t*     C_D pressure         C_D viscous          C_L                  rms error of u, v [U]")
     velocities = dict(zip(times, fields["velocity"], strict=True))
     for time in sorted({*times[times > START], *net}):
@@ -123,6 +129,10 @@ def compare(path: Path, resolution: int, until: float, settings: dict[str, objec
         state = simulation.snapshot()
         if time in net:
             beside.append(errors_beside(state, net[time], resolution))
+            kept = Started(resolution=resolution, reynolds=REYNOLDS, **settings).restored(
+                {name: value for name, value in simulation.state().items() if name != "unkept_pressure"}
+            )
+            rings.append([errors_around(each, net[time], resolution) for each in (simulation, kept)])
         if time not in velocities:
             continue
         expected, history = velocities[time], simulation.history()
@@ -142,6 +152,9 @@ def compare(path: Path, resolution: int, until: float, settings: dict[str, objec
         for low, high in itertools.pairwise(LAYERS):
             within = (found[:, 0] >= low) & (found[:, 0] < high)
             print(f"{low} to {high}      ", " ".join(f"{value:+.3f}" for value in found[within, 1:].mean(axis=0)))
+        print("height [Δx]  rms error around the cylinder of the mean C_p, and by p alone")
+        for height, around in zip(HEIGHTS, np.moveaxis(np.mean(rings, axis=0), 1, 0), strict=False):
+            print(f"{height:<12g}", " ".join(f"{value:.4f}" for value in np.sqrt((around**2).mean(axis=1))))
 
 
 def errors_beside(state: dict[str, np.ndarray], net: np.ndarray, resolution: int) -> np.ndarray:
@@ -162,6 +175,17 @@ def errors_beside(state: dict[str, np.ndarray], net: np.ndarray, resolution: int
     off = velocity[:, 1] * sine - velocity[:, 0] * cosine
     errors = np.column_stack([(radius - RADIUS) * resolution, along, off, pressure])
     return errors[(np.abs(angle) > SIDE[0]) & (np.abs(angle) < SIDE[1])]
+
+
+def errors_around(simulation: Simulation, net: np.ndarray, resolution: int) -> np.ndarray:
+    """Errors of C_p (heights, angles) on rings within the net, less their median on the outermost."""
+    radii = [radius for height in HEIGHTS if (radius := RADIUS + height / resolution) < RADII[-1]]
+    radius, angle = np.meshgrid(radii, ANGLES, indexing="ij")
+    points = np.stack([UPSTREAM - radius * np.cos(angle), radius * np.sin(angle)], axis=-1).reshape(-1, 2)
+    polar = np.column_stack([radius.ravel(), angle.ravel()])
+    known = RegularGridInterpolator((RADII, ANGLES), net[..., 2], method="cubic", bounds_error=False, fill_value=None)
+    error = 2 * (simulation.sample(points)["pressure"] - known(polar)).reshape(radius.shape)
+    return error - np.median(error[-1])
 
 
 def main() -> None:

@@ -52,7 +52,10 @@ class Simulation:
         """One row for each step since the last call, see docs/architecture.md for the columns."""
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
-        """Return the particles: the arrays of `state` and ``volume``, ``velocity_divergence``, ``vorticity``."""
+        """Return the particles: the arrays of `state` and ``volume``, ``velocity_divergence``, ``vorticity``.
+
+        The ``pressure`` is that which acts, smooth: it has the mean of the ``unkept_pressure``, which is left out.
+        """
 
     def failed_snapshot(self) -> dict[str, NDArray[Any]] | None:
         """Return what the step that broke down led to, at the positions before that step; None if none has."""

@@ -79,7 +79,7 @@ pub(super) fn read_particles<const D: usize>(state: &Bound<'_, PyDict>) -> PyRes
     let count = read_rows::<D>(state, "position", None)?.len();
     let mut particles = Particles { real: count, ..Particles::default() };
     each_array!(particles, (&mut) array, name => {
-        if !["id", "place"].contains(&name) || state.contains(name)? {
+        if !["id", "place", "unkept_pressure"].contains(&name) || state.contains(name)? {
             *array = Exchanged::read(state, name, count)?;
         }
     });
@@ -115,9 +115,14 @@ pub(super) fn state<'py, const D: usize>(py: Python<'py>, simulation: &Simulatio
         let numbers = PyArray1::from_iter(py, poses.iter().flat_map(Pose::numbers));
         dict.set_item("pose", numbers.reshape([poses.len(), NUMBERS])?)?;
     }
-    let has_surface = simulation.settings().free_surface.is_some();
+    let settings = simulation.settings();
     each_array!(particles, (&) array, name => {
-        if name != "place" || has_surface {
+        let is_told = match name {
+            "place" => settings.free_surface.is_some(),
+            "unkept_pressure" => settings.has_unkept_pressure(),
+            _ => true,
+        };
+        if is_told {
             dict.set_item(name, Exchanged::write(py, &array[..particles.real]))?;
         }
     });
@@ -135,6 +140,10 @@ pub(super) fn snapshot<'py, const D: usize>(
     let snapshot = py.detach(|| simulation.snapshot());
     let dict = state(py, simulation)?;
     let divergence: Vec<f64> = snapshot.velocity_gradient.iter().map(|gradient| gradient.trace()).collect();
+    if simulation.settings().has_unkept_pressure() {
+        dict.del_item("unkept_pressure")?; // the pressure has it
+    }
+    dict.set_item("pressure", snapshot.pressure.into_pyarray(py))?;
     dict.set_item("volume", snapshot.volume.into_pyarray(py))?;
     dict.set_item("velocity_divergence", divergence.into_pyarray(py))?;
     Ok((dict, snapshot.velocity_gradient))

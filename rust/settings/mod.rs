@@ -100,6 +100,11 @@ impl Settings {
         self.smoothing_ratio * self.particle_spacing
     }
 
+    /// Whether steps push with more than the pressure that they leave ([`crate::particles::Particles::unkept_pressure`]).
+    pub fn has_unkept_pressure(&self) -> bool {
+        self.free_surface.is_none() && !matches!(self.scheme, SchemeSettings::Wcsph { .. } | SchemeSettings::Edac { .. })
+    }
+
     /// Radius beyond which the kernel vanishes.
     pub fn support_radius(&self) -> f64 {
         self.kernel.support() * self.smoothing_length()

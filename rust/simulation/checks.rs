@@ -13,6 +13,9 @@ pub(super) fn check_particles<const D: usize>(settings: &Settings, particles: &m
     if particles.place.is_empty() || settings.free_surface.is_none() {
         particles.place = vec![Place::Inside; particles.real];
     }
+    if particles.unkept_pressure.is_empty() || !settings.has_unkept_pressure() {
+        particles.unkept_pressure = vec![0.0; particles.real];
+    }
     if particles.place.len() != particles.real {
         return array("place", format!("has {} entries for {} positions", particles.place.len(), particles.real));
     }
@@ -25,7 +28,11 @@ pub(super) fn check_particles<const D: usize>(settings: &Settings, particles: &m
         if let Some((name, value)) = vectors.iter().find(|(_, value)| !value.iter().all(|x| x.is_finite())) {
             return array(name, format!("of particle {i} is {:?}; all must be finite", value.as_slice()));
         }
-        let scalars = [("pressure", particles.pressure[i]), ("depth", particles.depth[i])];
+        let scalars = [
+            ("pressure", particles.pressure[i]),
+            ("depth", particles.depth[i]),
+            ("unkept_pressure", particles.unkept_pressure[i]),
+        ];
         if let Some((name, value)) = scalars.iter().find(|(_, value)| !value.is_finite()) {
             return array(name, format!("of particle {i} is {value}; all must be finite"));
         }

@@ -12,7 +12,7 @@ use crate::discretisation::VelocityGradient;
 use crate::flow::{Flow, Step};
 use crate::forcing::Forcing;
 use crate::frame::Travel;
-use crate::interpolation::interpolate;
+use crate::interpolation::{interpolate, smooth_acting_pressure};
 use crate::loads::loads;
 use crate::motion::{NUMBERS, Pose};
 use crate::particles::{ParticleKind, Particles, Place};
@@ -204,6 +204,15 @@ impl<const D: usize> Simulation<D> {
         }
         let pressure = |s: usize| scheme.pressure_force(step, flow, s);
         let loads = loads(step.settings, &flow.particles, &flow.frame, &flow.walls, &flow.motion, pressure);
+        if step.settings.has_unkept_pressure() {
+            let mut unkept = std::mem::take(&mut flow.particles.unkept_pressure);
+            parallel::for_each(flow.frame.images.real(&mut unkept), |i, unkept| {
+                let Particles { kind, pressure, .. } = &flow.particles;
+                let is_solid = kind[i] == ParticleKind::Solid;
+                *unkept = if is_solid { 0.0 } else { scheme.acting_pressure(step, &flow.particles, i) - pressure[i] };
+            });
+            flow.particles.unkept_pressure = unkept;
+        }
         let dissipated = dissipation(step, flow, &loads, |i| scheme.viscous_laplacian(step, i));
         let mut report = Report::new(step, flow, scheme.penalty(time_step), loads);
         report.dissipation = dissipated;
@@ -339,7 +348,10 @@ impl<const D: usize> Simulation<D> {
             let mut gradient = vec![Matrix::zeros(); particles.real];
             let operator = VelocityGradient(&particles.velocity);
             simulation.flow.frame.stencil.for_each_one(operator, &mut gradient, |_, value, gradient| *gradient = value);
-            Snapshot { volume: simulation.flow.frame.stencil.volume[..particles.real].to_vec(), velocity_gradient: gradient }
+            let mut pressure = smooth_acting_pressure(&simulation.settings, particles, &simulation.flow.frame);
+            pressure.truncate(particles.real);
+            let volume = simulation.flow.frame.stencil.volume[..particles.real].to_vec();
+            Snapshot { pressure, volume, velocity_gradient: gradient }
         })
     }
 
@@ -347,11 +359,11 @@ impl<const D: usize> Simulation<D> {
     pub fn sample(&mut self, points: &[Vector<D>]) -> Vec<(f64, Vector<D>)> {
         self.on_pool(|simulation| {
             simulation.prepare();
+            let Self { settings, flow: Flow { particles, frame, .. }, .. } = &*simulation;
+            let pressure = smooth_acting_pressure(settings, particles, frame);
             let mut values = vec![(f64::NAN, Vector::repeat(f64::NAN)); points.len()];
             parallel::for_each(&mut values, |k, value| {
-                if let Some(sample) =
-                    interpolate(&simulation.settings, &simulation.flow.particles, &simulation.flow.frame, &points[k])
-                {
+                if let Some(sample) = interpolate(settings, particles, frame, &pressure, &points[k]) {
                     *value = sample;
                 }
             });
@@ -393,6 +405,8 @@ impl<const D: usize> Simulation<D> {
 
 /// Fields derived from the particles at one time.
 pub struct Snapshot<const D: usize> {
+    /// The pressure that acts; see [`smooth_acting_pressure`].
+    pub pressure: Vec<f64>,
     pub volume: Vec<f64>,
     /// ∂u_k/∂x_l as the entry (k, l).
     pub velocity_gradient: Vec<Matrix<D>>,

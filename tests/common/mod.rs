@@ -68,6 +68,7 @@ pub fn particles<const D: usize>(points: Vec<Vector<D>>) -> Particles<D> {
         normal: vec![Vector::zeros(); count],
         depth: vec![0.0; count],
         place: vec![Place::Inside; count],
+        unkept_pressure: vec![0.0; count],
         id: (0..count as u64).collect(),
     }
 }

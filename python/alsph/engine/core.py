@@ -45,6 +45,7 @@ TYPES: dict[str, tuple[type[np.generic], int]] = {
     "normal": (np.float64, 2),
     "depth": (np.float64, 1),
     "place": (np.uint8, 1),
+    "unkept_pressure": (np.float64, 1),
     "id": (np.uint64, 1),
     "pose": (np.float64, 2),
 }

@@ -219,7 +219,8 @@ class Simulation:
         dict
             ``position``, ``velocity``, ``normal`` (n, d), ``pressure``, ``volume``, ``velocity_divergence``, ``kind``,
             ``body``, ``depth``, ``id``, beside a free surface ``place`` (n,), ``vorticity``, (n,) in 2-D and (n, 3) in
-            3-D; and the numbers ``time``, ``step``, ``mass_in`` and ``mass_out``.
+            3-D; and the numbers ``time``, ``step``, ``mass_in`` and ``mass_out``. The pressure is that which acts, with
+            the mean over the kernel's support of what :meth:`state` has beside it as ``unkept_pressure``.
         """
         with self._engine() as engine:
             return engine.snapshot()
@@ -279,7 +280,10 @@ class Simulation:
         return columns
 
     def sample(self, points: FloatArray) -> dict[str, FloatArray]:
-        """Return the fluid's ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d); NaN far from all fluid."""
+        """Return the fluid's ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d); NaN far from all fluid.
+
+        The pressure is that of :meth:`snapshot`.
+        """
         with self._engine() as engine:
             found = engine.sample(exact("points", points, np.float64, 2))
         surface = self.problem.settings.get("free_surface")

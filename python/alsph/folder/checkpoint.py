@@ -118,8 +118,8 @@ def digest(state: dict[str, Any]) -> str:
     order = np.argsort(state["id"]) if "id" in state else slice(None)
     for name in sorted(state):
         value = np.asarray(state[name])
-        if name == "place" and not value.any():
-            continue  # no step has been taken, or older versions do not tell
+        if name == "unkept_pressure" or (name == "place" and not value.any()):
+            continue  # steps do not go on with it, and older versions do not tell; no step has been taken, or the same
         value = np.ascontiguousarray(value[order] if value.ndim and name not in OF_BODIES else value)
         total.update(f"{name} {value.dtype.str} {value.shape}".encode())
         total.update(value.data)
