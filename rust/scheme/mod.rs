@@ -33,6 +33,18 @@ pub trait Scheme<const D: usize>: Send + Sync {
     /// What the velocity of the step had the gradient of.
     fn acting_pressure(&self, step: Step, particles: &Particles<D>, i: usize) -> f64;
 
+    /// Note what pushed the flowing particles beside the pressure that they keep.
+    fn note_unkept_pressure(&self, step: Step, Flow { particles, frame, .. }: &mut Flow<D>) {
+        if step.settings.has_unkept_pressure() {
+            let mut unkept = std::mem::take(&mut particles.unkept_pressure);
+            parallel::for_each(frame.images.real(&mut unkept), |i, unkept| {
+                let flows = particles.kind[i] != ParticleKind::Solid;
+                *unkept = if flows { self.acting_pressure(step, particles, i) - particles.pressure[i] } else { 0.0 };
+            });
+            particles.unkept_pressure = unkept;
+        }
+    }
+
     /// The force on solid particle `s` of all but the viscous term.
     fn pressure_force(&self, step: Step, flow: &Flow<D>, s: usize) -> Vector<D> {
         force_of_pressure(&flow.frame.stencil, |i| self.acting_pressure(step, &flow.particles, i), s)

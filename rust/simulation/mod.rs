@@ -204,15 +204,7 @@ impl<const D: usize> Simulation<D> {
         }
         let pressure = |s: usize| scheme.pressure_force(step, flow, s);
         let loads = loads(step.settings, &flow.particles, &flow.frame, &flow.walls, &flow.motion, pressure);
-        if step.settings.has_unkept_pressure() {
-            let mut unkept = std::mem::take(&mut flow.particles.unkept_pressure);
-            parallel::for_each(flow.frame.images.real(&mut unkept), |i, unkept| {
-                let Particles { kind, pressure, .. } = &flow.particles;
-                let is_solid = kind[i] == ParticleKind::Solid;
-                *unkept = if is_solid { 0.0 } else { scheme.acting_pressure(step, &flow.particles, i) - pressure[i] };
-            });
-            flow.particles.unkept_pressure = unkept;
-        }
+        scheme.note_unkept_pressure(step, flow);
         let dissipated = dissipation(step, flow, &loads, |i| scheme.viscous_laplacian(step, i));
         let mut report = Report::new(step, flow, scheme.penalty(time_step), loads);
         report.dissipation = dissipated;
