@@ -12,17 +12,20 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 const LARGEST_AMPLIFICATION: f64 = 8.0;
 
 /// The pressure of particles and images: what they keep of it and, of what else pushed the fluid in the last step, the mean over the
-/// kernel's support. Next to walls that alternates from layer to layer, which no gradient sees and no fit can read.
+/// kernel's support. Next to walls that alternates from layer to layer, which no gradient sees and no fit can read. It takes about as
+/// long as a pass; what is not `wanted` of the real particles stays without.
 pub fn smooth_acting_pressure<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
     Frame { stencil, images, .. }: &Frame<D>,
+    wanted: impl Fn(usize) -> bool + Sync,
 ) -> Vec<f64> {
     let Particles { kind, pressure, unkept_pressure, .. } = particles;
     let mut acting = pressure.clone();
     if settings.has_unkept_pressure() {
         parallel::for_each(images.real(&mut acting), |i, acting| {
-            if kind[i] != ParticleKind::Solid
+            if wanted(i)
+                && kind[i] != ParticleKind::Solid
                 && let Some([mean]) = shepard(settings, stencil, i, |j, _| [unkept_pressure[j]])
             {
                 *acting += mean;
@@ -33,29 +36,54 @@ pub fn smooth_acting_pressure<const D: usize>(
     acting
 }
 
+/// Whether each real particle, or an image of it, is near any of `points`.
+pub fn is_near<const D: usize>(
+    settings: &Settings,
+    particles: &Particles<D>,
+    frame: &Frame<D>,
+    points: &[Vector<D>],
+) -> Vec<bool> {
+    let mut is_near = vec![false; particles.real];
+    for point in points {
+        for_each_near(settings, particles, frame, point, |j| is_near[frame.images.source(particles.real, j)] = true);
+    }
+    is_near
+}
+
+/// `f` for every particle and image less than the support radius away from `point`.
+fn for_each_near<const D: usize>(
+    settings: &Settings,
+    Particles { position, .. }: &Particles<D>,
+    Frame { grid, .. }: &Frame<D>,
+    point: &Vector<D>,
+    mut f: impl FnMut(usize),
+) {
+    let radius = settings.support_radius();
+    if point.iter().all(|x| x.is_finite()) {
+        grid.for_each_run(&[*point], |run| {
+            let indices = run.indices.iter().map(|&j| j as usize);
+            indices.filter(|&j| (position[j] - point).norm_squared() < radius * radius).for_each(&mut f);
+        });
+    }
+}
+
 /// Pressure and velocity at `point` from the fluid around it that is seen from there, the particles having such a `pressure`: exact for
 /// quadratic fields, for linear ones where few particles are near. None where no fluid is near.
 pub fn interpolate<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
-    Frame { grid, faces, .. }: &Frame<D>,
+    frame: &Frame<D>,
     pressure: &[f64],
     point: &Vector<D>,
 ) -> Option<(f64, Vector<D>)> {
-    if !point.iter().all(|x| x.is_finite()) {
-        return None;
-    }
     let radius = settings.support_radius();
     let (mut near, mut solid) = (Vec::new(), Vec::new());
-    grid.for_each_run(&[*point], |run| {
-        let inside = run.indices.iter().map(|&j| j as usize);
-        for j in inside.filter(|&j| (particles.position[j] - point).norm_squared() < radius * radius) {
-            if particles.kind[j] == ParticleKind::Solid { solid.push(j) } else { near.push(j) }
-        }
+    for_each_near(settings, particles, frame, point, |j| {
+        if particles.kind[j] == ParticleKind::Solid { solid.push(j) } else { near.push(j) }
     });
     let weights = with_kernel!(settings.kernel, kernel => {
         let kernel = Smoothing::new(kernel, settings.smoothing_length(), D);
-        let seen = |place: &Vector<D>| faces.sight(particles, settings.particle_spacing, &solid, point, place);
+        let seen = |place: &Vector<D>| frame.faces.sight(particles, settings.particle_spacing, &solid, point, place);
         shape_functions(&near, radius, particles, point, |place: &Vector<D>, distance| seen(place) * kernel.value(distance))
     })?;
     let pressure = near.iter().zip(&weights).map(|(&j, w)| pressure[j] * w).sum();

@@ -12,7 +12,7 @@ use crate::discretisation::VelocityGradient;
 use crate::flow::{Flow, Step};
 use crate::forcing::Forcing;
 use crate::frame::Travel;
-use crate::interpolation::{interpolate, smooth_acting_pressure};
+use crate::interpolation::{interpolate, is_near, smooth_acting_pressure};
 use crate::loads::loads;
 use crate::motion::{NUMBERS, Pose};
 use crate::particles::{ParticleKind, Particles, Place};
@@ -340,7 +340,7 @@ impl<const D: usize> Simulation<D> {
             let mut gradient = vec![Matrix::zeros(); particles.real];
             let operator = VelocityGradient(&particles.velocity);
             simulation.flow.frame.stencil.for_each_one(operator, &mut gradient, |_, value, gradient| *gradient = value);
-            let mut pressure = smooth_acting_pressure(&simulation.settings, particles, &simulation.flow.frame);
+            let mut pressure = smooth_acting_pressure(&simulation.settings, particles, &simulation.flow.frame, |_| true);
             pressure.truncate(particles.real);
             let volume = simulation.flow.frame.stencil.volume[..particles.real].to_vec();
             Snapshot { pressure, volume, velocity_gradient: gradient }
@@ -352,7 +352,8 @@ impl<const D: usize> Simulation<D> {
         self.on_pool(|simulation| {
             simulation.prepare();
             let Self { settings, flow: Flow { particles, frame, .. }, .. } = &*simulation;
-            let pressure = smooth_acting_pressure(settings, particles, frame);
+            let wanted = is_near(settings, particles, frame, points);
+            let pressure = smooth_acting_pressure(settings, particles, frame, |i| wanted[i]);
             let mut values = vec![(f64::NAN, Vector::repeat(f64::NAN)); points.len()];
             parallel::for_each(&mut values, |k, value| {
                 if let Some(sample) = interpolate(settings, particles, frame, &pressure, &points[k]) {
