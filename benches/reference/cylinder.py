@@ -116,7 +116,8 @@ def compare(path: Path, resolution: int, until: float, settings: dict[str, objec
             arrays["velocity"][fluid], arrays["pressure"][fluid] = start[*cell.T, :2], start[*cell.T, 2]
             return arrays
 
-    simulation = Started(resolution=resolution, reynolds=REYNOLDS, **settings).simulation()
+    case = Started(resolution=resolution, reynolds=REYNOLDS, **settings)
+    simulation = case.simulation()
     points = comparison_points()
     times, known, net = fields["times"], fields["history"], dict(zip(fields["net_times"], fields["net"], strict=True))
     beside, rings = [], []
@@ -129,9 +130,7 @@ def compare(path: Path, resolution: int, until: float, settings: dict[str, objec
         state = simulation.snapshot()
         if time in net:
             beside.append(errors_beside(state, net[time], resolution))
-            kept = Started(resolution=resolution, reynolds=REYNOLDS, **settings).restored(
-                {name: value for name, value in simulation.state().items() if name != "unkept_pressure"}
-            )
+            kept = case.restored({k: v for k, v in simulation.state().items() if k != "unkept_pressure"})
             rings.append([errors_around(each, net[time], resolution) for each in (simulation, kept)])
         if time not in velocities:
             continue
