@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from alsph import Simulation
 from alsph.errors import AlsphError, ConfigError, SharedError
+from alsph.geometry.particles import Kind
 
 
 def in_a_child(action):
@@ -138,7 +139,7 @@ def test_numbers_and_arrays_are_asked_for_in_plain_words(small):
     simulation = small.simulation(1)
     for use, message in (
         (lambda: simulation.advance(1.5), "steps = 1.5: must be a whole number"),
-        (lambda: simulation.advance(-3), "steps = -3: must not be negative"),
+        (lambda: simulation.advance(-3), "steps = -3: must be a whole number, 0 or more"),
         (lambda: small.run("run", progress="no"), "progress = 'no': must be True or False"),
         (lambda: alsph.open_run(3), "run = 3: must be the path of a run folder"),
         (lambda: alsph.cases.find(7), "case = 7: must be the name of a case, or FILE.py:CLASS"),
@@ -152,9 +153,36 @@ def test_numbers_and_arrays_are_asked_for_in_plain_words(small):
         (lambda: simulation.sample([1.0, 2.0]), "array `points`: must have 2 dimensions, and has 1"),
         (lambda: small.simulation("2"), "threads = '2': must be a whole number, 1 or more"),
         (lambda: small.simulation(0), "threads = 0: must be a whole number, 1 or more"),
+        (lambda: simulation.advance(10**30), "steps = 1000000000000000000000000000000: too large"),
+        (lambda: simulation.advance(1, wall_seconds="1"), "wall_seconds = '1': must be a number"),
+        (lambda: simulation.advance(1, wall_seconds=float("nan")), "wall_seconds = nan: must be a number"),
+        (lambda: simulation.restore(None), r"state = None: must be what `state\(\)` has returned"),
+        (lambda: simulation.prescribe(forcing=np.zeros(2)), "forcing = array.*: must be a function of positions"),
+        (lambda: simulation.sample(np.ma.masked_less([[0.0, 1.0]], 0.5)), "array `points`: must hold numbers"),
     ):
         with pytest.raises(ConfigError, match=message):
             use()
-    simulation.set_inflow(lambda position, time: "fast")
-    with pytest.raises(ConfigError, match="inflow: the function must give 2 numbers a position"):
-        simulation.advance(1)
+    for rule, gave in (
+        (lambda position, time: "fast", "a str that is none"),
+        (lambda position, time: 1j * position, "a ndarray that is none"),
+        (lambda position, time: np.ma.masked_less(position, 0.5), "a MaskedArray that is none"),
+        (lambda position, time: position[:3], r"an array \(3, 2\)"),
+    ):
+        simulation.set_inflow(rule)
+        with pytest.raises(ConfigError, match=f"inflow: the function must give 2 numbers a position.* and gave {gave}"):
+            simulation.advance(1)
+    assert small.simulation(np.int64(1)).threads == 1
+
+
+def test_a_refused_inflow_changes_nothing(small):
+    simulation = small.simulation(1)
+    simulation.set_inflow(lambda position, time: [0.5, 0.0])
+    for refused in ([-1.0, 0.0], [1.0, 0.0, 0.0], np.full((3, 2), 0.5), [np.nan, 0.0]):
+        with pytest.raises(ConfigError):
+            simulation.set_inflow(refused)
+    simulation.advance(1)
+    state = simulation.state()
+    assert list(simulation.rules) == ["inflow"]
+    assert (state["velocity"][state["kind"] == Kind.INLET] == [0.5, 0.0]).all()
+    simulation.set_inflow([0.75, 0.0])
+    assert not simulation.rules and not simulation.prescribed

@@ -81,7 +81,7 @@ def exact(name: str, values: ArrayLike, kind: type[np.generic], dimensions: int 
     wanted = "numbers" if kind == np.float64 else f"whole numbers from 0 to {256 ** np.dtype(kind).itemsize - 1}"
     try:
         given = np.asarray(values)
-        given = given if given.dtype.kind in "iufb" else np.array(None)
+        given = given if given.dtype.kind in "iufb" and not np.ma.is_masked(values) else np.array(None)
         with np.errstate(all="ignore"):
             found = np.ascontiguousarray(given, kind)
         if not np.array_equal(given, found, equal_nan=kind == np.float64):

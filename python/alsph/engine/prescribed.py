@@ -5,6 +5,7 @@ the constant one [U²/D]; ``sliding``, the velocity of the surfaces of bodies th
 bodies have come [D] and turned [rad], whose centres at the start are the positions.
 """
 
+import contextlib
 import hashlib
 import traceback
 from collections.abc import Callable, Mapping
@@ -101,10 +102,11 @@ def asked(name: str, rule: Rule, position: FloatArray, time: float) -> FloatArra
         raise
     if values is None and name == "inflow":
         return None
-    try:
-        vectors = np.asarray(() if values is None else values, float)
-    except (TypeError, ValueError):
-        vectors = np.empty(0)
+    vectors = np.empty(0)
+    if not (values is None or np.ma.is_masked(values)):
+        with contextlib.suppress(TypeError, ValueError):
+            given = np.asarray(values)
+            vectors = vectors if given.dtype.kind == "c" else given.astype(float)
     dimensions = position.shape[1]
     numbers = [dimensions, 3 if dimensions == 2 else 6] if name == "motion" else [dimensions]
     if vectors.shape[-1:] not in {(number,) for number in numbers} or vectors.shape[:-1] not in {
@@ -114,7 +116,11 @@ def asked(name: str, rule: Rule, position: FloatArray, time: float) -> FloatArra
         told = " or ".join(map(str, numbers))
         code = getattr(rule, "__code__", None)
         where = f"{code.co_filename}: line {code.co_firstlineno}: " if code else ""
-        raise ConfigError(f"{where}{name}: the function must give {told} numbers a position, or as many")
+        gave = f"an array {vectors.shape}" if vectors.size else f"a {type(values).__name__} that is none"
+        raise ConfigError(
+            f"{where}{name}: the function must give {told} numbers a position, or {told} that hold for all of the "
+            f"{len(position)}, and gave {gave}"
+        )
     return np.broadcast_to(vectors, (len(position), vectors.shape[-1]))
 
 

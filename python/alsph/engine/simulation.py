@@ -2,12 +2,11 @@
 
 import json
 import math
-import operator
 import os
 import threading
 import time as clock
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import alsph._alsph as _alsph
+from alsph.arguments import number, whole
 from alsph.arrays import Arrays, FloatArray
 from alsph.engine.columns import left_out
 from alsph.engine.core import TYPES, exact, translated
@@ -31,23 +31,6 @@ AS_IT_IS: Any = object()
 
 SLICE_SECONDS = 0.2
 """Longest time in the engine without a look at signals, so that Ctrl-C works."""
-
-
-def _whole(name: str, value: Any) -> int:
-    try:
-        return operator.index(value)
-    except TypeError:
-        raise ConfigError(f"{name} = {shown(value)}: must be a whole number") from None
-
-
-def _number(name: str, value: Any) -> float:
-    try:
-        number = math.nan if isinstance(value, str) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if math.isnan(number):
-        raise ConfigError(f"{name} = {shown(value)}: must be a number")
-    return number
 
 
 class Simulation:
@@ -93,8 +76,9 @@ class Simulation:
         self._start(problem.state, threads)
 
     def _start(self, state: dict[str, Any], threads: int | None) -> None:
-        if threads is not None and not (isinstance(threads, int) and threads >= 1):
-            raise ConfigError(f"threads = {shown(threads)}: must be a whole number, 1 or more")
+        threads = None if threads is None else whole("threads", threads, 1)
+        if not isinstance(state, Mapping):
+            raise ConfigError(f"state = {shown(state)}: must be what `state()` has returned")
         arrays = {name: exact(name, state[name], *TYPES[name]) if name in TYPES else state[name] for name in state}
         with translated():
             self._engine_of_process = _alsph.Simulation(json.dumps(self.problem.settings), arrays, threads)
@@ -169,9 +153,7 @@ class Simulation:
         SolverError
             If the computation breaks down.
         """
-        steps = _whole("steps", steps)
-        if steps < 0:
-            raise ConfigError(f"steps = {steps}: must not be negative")
+        steps = whole("steps", steps, 0)
         with self._engine() as engine:
             first = engine.step
             for seconds in _slices(wall_seconds):
@@ -191,7 +173,7 @@ class Simulation:
         SolverError
             If the computation breaks down.
         """
-        time = _number("time", time)
+        time = number("time", time)
         with self._engine() as engine:
             for seconds in _slices(wall_seconds):
                 if engine.time >= time:
@@ -204,9 +186,8 @@ class Simulation:
 
     def steps(self, every: float, until: float | None = None) -> Iterator[Arrays]:
         """Step to the next multiple of `every` [D/U], yield a :meth:`snapshot`, and so on until `until`."""
-        if not 0 < _number("every", every) < math.inf:
-            raise ConfigError(f"every = {every}: must be a positive number [D/U]")
-        until = self.until if until is None else _number("until", until)
+        every = number("every", every, above=0, unit="D/U", finite=True)
+        until = self.until if until is None else number("until", until)
         while self.time < until:
             self.run_until(min(next_multiple(self.time, every), until))
             yield self.snapshot()
@@ -312,12 +293,11 @@ class Simulation:
         ConfigError
             If it is no such array, or more fluid would leave through an inlet than enter.
         """
-        for told in (self.rules, self.prescribed):
-            told.pop("inflow", None)
         if callable(velocity):
             self._tell("inflow", velocity)
         else:
             self._apply(velocity, self.inflow_position())
+            self._forget("inflow")
 
     def prescribe(
         self,
@@ -356,6 +336,10 @@ class Simulation:
         :meth:`~alsph.cases.driven.Driven.sliding`. They are called in a thread of the engine, and cannot use the
         simulation.
         """
+        given = {"forcing": forcing, "sliding": sliding, "motion": motion}
+        for name, rule in given.items():
+            if not (rule is None or rule is AS_IT_IS or callable(rule)):
+                raise ConfigError(f"{name} = {shown(rule)}: must be a function of positions and time, or None")
         if callable(sliding) and all(body["velocity"] is not None for body in self.problem.settings["bodies"]):
             raise ConfigError(
                 "sliding: each body has a velocity of its own; give those whose surface slides velocity = None, or "
@@ -366,14 +350,14 @@ class Simulation:
                 "motion: no body is moved by it; give those that are moves = True and velocity = None, or make it the "
                 "method `motion` of the case's class"
             )
-        for name, rule in (("forcing", forcing), ("sliding", sliding), ("motion", motion)):
-            if rule is AS_IT_IS:
-                continue
-            for told in (self.rules, self.prescribed):
-                told.pop(name, None)
-            if rule is not None:
-                self._tell(name, rule)
+        named = {name: rule for name, rule in given.items() if rule is not AS_IT_IS}
+        for name, rule in named.items():
+            self._forget(name) if rule is None else self._tell(name, rule)
         self._hand_over()
+
+    def _forget(self, name: str) -> None:
+        for told in (self.rules, self.prescribed):
+            told.pop(name, None)
 
     def _tell(self, name: str, rule: Rule) -> None:
         self.rules[name] = rule
@@ -409,11 +393,11 @@ class Simulation:
     def _apply(self, velocity: ArrayLike, position: FloatArray) -> FloatArray:
         """Give the inlet particles at `position` (m, d) a velocity, (d,) or (m, d), and return it as (m, d)."""
         values = exact("inflow velocity", velocity, np.float64)
+        if values.shape in (position.shape[1:], position.shape):
+            self._check_inflow(position, np.broadcast_to(values, position.shape))
         with self._engine() as engine:
-            engine.set_inflow(values)  # refuses wrong shapes
-        every = np.broadcast_to(values, position.shape)
-        self._check_inflow(position, every)
-        return every
+            engine.set_inflow(values)  # refuses other shapes
+        return np.broadcast_to(values, position.shape)
 
     def _check_inflow(self, position: FloatArray, velocity: FloatArray) -> None:
         """Refuse backflow at an inlet, and warn once of such in places."""
@@ -445,6 +429,6 @@ def next_multiple(time: float, interval: float) -> float:
 
 def _slices(wall_seconds: float) -> Iterator[float]:
     """Yield the lengths of short slices of `wall_seconds` until they have passed."""
-    end = clock.monotonic() + wall_seconds
+    end = clock.monotonic() + number("wall_seconds", wall_seconds)
     while (left := end - clock.monotonic()) > 0:
         yield min(left, SLICE_SECONDS)

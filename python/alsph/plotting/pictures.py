@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from alsph.analysis import sampling
 from alsph.analysis.vortices import DERIVED
+from alsph.arguments import number
 from alsph.arrays import AXES, FloatArray
 from alsph.errors import ConfigError
 from alsph.geometry.particles import Kind, Snapshot
@@ -175,8 +176,7 @@ def _draw_field(
 ) -> float:
     """Draw a field with its colour bar; return the end of the colour scale."""
     style = field_style(name)
-    if limit is not None and not (isinstance(limit, int | float | np.number) and 0 < limit < np.inf):
-        raise ConfigError(f"limit = {shown(limit)}: must be a number above zero")
+    limit = None if limit is None else number("limit", limit, above=0, finite=True)
     picture, inside = _raster(snapshot, name, spacing, extent, plane)
     body = _solid(snapshot, spacing, extent, plane, picture)
     limit = limit or _limit(picture[inside])

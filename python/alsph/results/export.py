@@ -16,6 +16,7 @@ import numpy as np
 from alsph.analysis import sampling
 from alsph.analysis.probes import Probes
 from alsph.analysis.vortices import DERIVED, vorticity
+from alsph.arguments import number
 from alsph.arrays import AXES, FloatArray
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import vtkhdf
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     import pyvista
     import xarray
 
-MOST_POINTS, LARGEST = 20_000_000, 1e15
+MOST_POINTS = 20_000_000
 
 FORMATS = {"vtkhdf": ".vtkhdf", "vti": ".vti", "netcdf": ".nc", "csv": ".csv"}
 """Formats of grids, and how their files end."""
@@ -378,9 +379,7 @@ def grid(
     symbols: Symbols = GENERAL,
 ) -> Grid:
     """Return the fields of a snapshot on a regular grid; see :meth:`alsph.Run.to_grid`."""
-    spacing = own_spacing if spacing is None else spacing
-    if not (isinstance(spacing, int | float) and 0 < spacing < LARGEST):
-        raise ConfigError(f"spacing = {shown(spacing)}: must be a number above zero [D]")
+    spacing = own_spacing if spacing is None else number("spacing", spacing, above=0, unit="D", finite=True)
     lower, upper = box
     for name in derived:
         choose("field", name, DERIVED)

@@ -10,8 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import FrameType
 
-import numpy as np
-
+from alsph.arguments import number, whole
 from alsph.errors import ConfigError, Interrupted
 from alsph.text import shown
 
@@ -42,11 +41,8 @@ class Control:
         """Refuse what makes no sense."""
         if not isinstance(self.progress, bool):
             raise ConfigError(f"progress = {shown(self.progress)}: must be True or False")
-        if not (isinstance(self.walltime, int | float | np.number) and self.walltime > 0):
-            raise ConfigError(f"walltime = {shown(self.walltime)}: must be a number above zero [s]")
-        if not (isinstance(self.retry, int) and self.retry >= 0):
-            raise ConfigError(f"retry = {shown(self.retry)}: must be a whole number, 0 or more")
-        object.__setattr__(self, "deadline", clock.monotonic() + self.walltime)
+        object.__setattr__(self, "retry", whole("retry", self.retry, 0))
+        object.__setattr__(self, "deadline", clock.monotonic() + number("walltime", self.walltime, above=0, unit="s"))
 
 
 @contextlib.contextmanager

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from alsph.arguments import number
 from alsph.cases import Case
 from alsph.config import Config
 from alsph.errors import ConfigError, SolverError
@@ -142,7 +143,8 @@ def autotune(
 
     The flow is first developed with the case's own settings and the stability law. From that state the time step is
     raised (or lowered) on a ladder of √2 until a probe breaks down, and the last rung is bisected. Then, with `margin`
-    times the largest stable step, iterations and projection sweeps are tried, cheapest first.
+    times the largest stable step, iterations and projection sweeps are tried, cheapest first. If none is good enough,
+    the shorter steps of the ladder count, too.
 
     Parameters
     ----------
@@ -170,8 +172,7 @@ def autotune(
     """
     numbers = {"divergence": divergence, "develop": develop, "probe": probe, "margin": margin}
     for name, value in numbers.items():
-        if not 0 < value < math.inf:
-            raise ConfigError(f"{name} = {value}: must be a positive number")
+        number(name, value, above=0, finite=True)
     if margin > 1:
         raise ConfigError(f"margin = {margin}: must not exceed 1, the largest stable step itself")
     if case.scheme not in (None, "alsph"):
@@ -179,10 +180,11 @@ def autotune(
     tuner = _Tuner(case, develop, probe, threads, Console(highlight=False, quiet=not progress, soft_wrap=True))
     stable, unstable = tuner.time_step()
     tuner.iterations(margin * stable, divergence)
-    tried = [found for found in tuner.probes if found.stable and found.time_step == margin * stable]
-    if not tried:
+    tried = [found for found in tuner.probes if found.stable and found.time_step <= margin * stable]
+    if not any(found.time_step == margin * stable for found in tried):
         raise ConfigError(f"no iterations are stable with ΔtU/Δx = {margin * stable:.4g}; take a smaller margin")
-    good = [found for found in tried if found.divergence <= divergence]
+    low = [found for found in tried if found.divergence <= divergence]
+    good = [found for found in low if found.time_step == margin * stable] or low
     best = min(good, key=lambda found: found.cost) if good else min(tried, key=lambda found: found.divergence)
     tuned = case.replace(
         courant=case.courant and max(case.courant, best.time_step * tuner.velocity_max),
@@ -242,9 +244,9 @@ class _Tuner:
     def iterations(self, step: float, target: float) -> None:
         """Try iterations and sweeps with a time step, from the cheapest on, until one is good enough."""
         sweeps = SWEEPS if self.case.projection_sweeps else (0,)
-        for number in sweeps:
+        for count in sweeps:
             for iterations in ITERATIONS:
-                found = self._probe(step, iterations, number)
+                found = self._probe(step, iterations, count)
                 cheaper = [p.cost for p in self.probes if p.time_step == step and p.divergence <= target]
                 if found.divergence <= target or (cheaper and found.cost > min(cheaper)):
                     break

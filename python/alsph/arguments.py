@@ -1,0 +1,53 @@
+"""Numbers that functions are called with, as Python's or NumPy's: checked where they come in."""
+
+import math
+import operator
+from typing import Any
+
+import numpy as np
+
+from alsph.errors import ConfigError
+from alsph.text import shown
+
+MOST = 2**62
+"""Larger whole numbers do not reach the engine."""
+
+
+def whole(name: str, value: Any, least: int | None = None) -> int:
+    """Return a whole number.
+
+    Raises
+    ------
+    ConfigError
+        If it is none, too large, or less than `least`; the message begins with `name`.
+    """
+    try:
+        number = None if isinstance(value, bool | np.bool_) else operator.index(value)
+    except TypeError:
+        number = None
+    if number is None or (least is not None and number < least):
+        bound = "" if least is None else f", {least} or more"
+        raise ConfigError(f"{name} = {shown(value)}: must be a whole number{bound}")
+    if abs(number) > MOST:
+        raise ConfigError(f"{name} = {shown(value)}: too large")
+    return number
+
+
+def number(name: str, value: Any, above: float | None = None, unit: str = "", *, finite: bool = False) -> float:
+    """Return a number.
+
+    Raises
+    ------
+    ConfigError
+        If it is none, not greater than `above`, or infinite where it must be `finite`; the message begins with `name`
+        and ends with `unit`.
+    """
+    try:
+        found = math.nan if isinstance(value, str | bytes | bool | np.bool_) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        found = math.nan
+    if math.isnan(found) or (above is not None and not found > above) or (finite and math.isinf(found)):
+        kind = "a finite number" if finite and math.isinf(found) else "a number"
+        least = "" if above is None else " above zero" if above == 0 else f" above {above:g}"
+        raise ConfigError(f"{name} = {shown(value)}: must be {kind}{least}{f' [{unit}]' if unit else ''}")
+    return found
