@@ -238,7 +238,7 @@ fn inlet_pressure<const D: usize>(settings: &Settings, particles: &Particles<D>)
     let [sum, count] = exact_sums(particles.real, |i| {
         let near = |&(axis, plane): &(usize, f64)| (particles.position[i][axis] - plane).abs() <= settings.particle_spacing;
         let planes = planes.iter().filter(|plane| particles.kind[i] != ParticleKind::Solid && near(plane)).count() as f64;
-        (planes > 0.0).then(|| [planes * particles.pressure[i], planes])
+        (planes > 0.0).then(|| [planes * (particles.pressure[i] + particles.unkept_pressure[i]), planes])
     });
     sum / count
 }

@@ -15,13 +15,15 @@ import numpy as np
 import pytest
 import tomli_w
 from alsph import Run, study
+from alsph.analysis.averages import Estimate
 from alsph.cases import Couette, Cylinder, TaylorGreen
 from alsph.errors import ConfigError, WalltimeError
 from alsph.study import Figure, Study, Sweep
 from alsph.study.board import Board
+from alsph.study.declaration import RUNS, Published
 from alsph.study.execution import _jobs
-from alsph.study.results import _time_of_largest_lift, names
-from alsph.study.state import RUNS, State, state
+from alsph.study.results import Results, _time_of_largest_lift, names
+from alsph.study.state import State, state
 from rich.console import Console
 from synthetic import write_run
 
@@ -93,6 +95,18 @@ def test_a_sweep_that_makes_no_case_is_refused_with_the_reason(changes, message)
         (lambda: Figure(name="../f", x="a", y=["b"]), "name"),
         (lambda: declare(figures=[Figure(name="f", x="reynold", y=["b"])]), "did you mean 'reynolds'"),
         (lambda: declare(name="../up"), "name"),
+        (lambda: declare(name="runs"), "name: runs is the folder of the run folders"),
+        (lambda: declare(base=VORTEX | {"run": 3}), "base.run = 3: must be a table"),
+        (lambda: Sweep(product={"a": [1]}, together={"a": [2]}), "a: stands in product and in together"),
+        (lambda: Sweep(sets=[{"a": 1}], until_diverged={"a": [2]}), "a: stands in until_diverged and in sets"),
+            lambda: Sweep(sets=[{"b": 1}, {"a": 1}], until_diverged={"a": [2]}),
+            "a: stands in until_diverged and in sets",
+        ),
+        (lambda: Sweep(product={"run.threads": [1, 2]}), "run.threads: changes nothing in the results"),
+        (lambda: declare(sweep=Sweep(product={"time": [1.0, 2.0]})), "time: a column of the results is called so"),
+        (lambda: declare(figures=2 * [Figure(name="f", x="reynolds", y=["b"])]), "figure f: two figures are called so"),
+        (lambda: Figure(name="f", x="a", y=["b", "c"], labels={"b": "d", "c": "d"}), "two of y have the same name"),
+        (lambda: Figure(name="f", x="a", y=["b"], labels={"y": "d"}), "labels.y: is not drawn"),
     ],
 )
 def test_a_declaration_that_cannot_be_used_is_refused_with_the_reason(make, message):
@@ -111,6 +125,9 @@ def test_files_that_cannot_be_used_are_refused_with_their_name(tmp_path):
         ('name = "a"\n[figure]\nname = "b"', "double brackets"),
         ('name = "a"\n[base]\n[[figure]]\nname = "b"\nkind = "fields"\ny = ["vortex"]', "did you mean 'vorticity'"),
         ('name = "a"\nbase = {}\n[[figure]]\nname = "b"\nkind = "curve"', "kind"),
+        ('name = "a"\n[preset.fine]\nsweep = 3', "sweep = 3: must be a table"),
+        ('name = "a"\n[preset.fine.base]\nrun = 3', "base.run = 3: must be a table"),
+        ('name = "a"\n[preset.fine]\nfigure = [3]', "figure: must be tables with double brackets"),
     ):
         path.write_text(content)
         with pytest.raises(ConfigError, match=f"study.toml: .*{message}"):
@@ -283,6 +300,114 @@ def test_words_on_the_abscissa_are_drawn(done):
     sweep = Sweep(product={"algorithm": [2, "midpoint"]})
     figures = [Figure(name="decay", x="algorithm", y=[DECAY])]
     assert study.run(declare(sweep=sweep, figures=figures), done.path.parent, progress=False).draw()
+
+
+def test_so_are_lists(done):
+    """Sines and cosines of a motion, say."""
+    declared = declare(figures=[Figure(name="decay", x="reynolds", y=[DECAY])])
+    results = Results.of(declared, declared.points(), done.path.parent)
+    for row, value in zip(results.rows, ([1.0], [1.0, 2.0]), strict=True):
+        row["reynolds"] = value
+    assert [text.get_text() for text in results.draw()["decay"].axes[0].get_xticklabels()] == ["[1.0]", "[1.0, 2.0]"]
+
+
+def collected(path, rows, references=None, **declared):
+    """The results of a study of vortices whose runs have found such decay rates, by their parameters."""
+    declared = declare(**declared)
+    points = declared.points()
+    assert [dict(point.parameters) for point in points] == [parameters for parameters, _ in rows]
+    found = [{DECAY: Estimate(value)} for _, value in rows]
+    table = [
+        dict(parameters) | {"status": "finished", "time": 1.0, "seconds": 1.0} | results | {"folder": "runs/none"}
+        for (parameters, _), results in zip(rows, found, strict=True)
+    ]
+    known = [{DECAY: value} for value in references] if references else [{} for _ in rows]
+    return Results(declared, path, table, known, [State("finished") for _ in rows], found)
+
+
+def lines_of(results, name="decay"):
+    """What a figure's only panel draws: abscissae and ordinates by label."""
+    (axes,) = results.draw()[name].axes
+    return {line.get_label(): (list(line.get_xdata()), list(line.get_ydata())) for line in labelled(axes)}
+
+
+def labelled(axes):
+    handles, names = axes.get_legend_handles_labels()
+    lines = [getattr(handle, "lines", [handle])[0] for handle in handles]
+    for line, name in zip(lines, names, strict=True):
+        line.set_label(name)
+    return lines
+
+
+def test_parameters_that_are_nearly_the_same_are_told_apart(tmp_path):
+    figures = [Figure(name="decay", x="resolution", y=[DECAY])]
+    sweep = Sweep(product={"reynolds": [20001.0, 20002.0], "resolution": [10, 12]})
+    rows = [({"reynolds": re, "resolution": n}, re + n) for re in (20001.0, 20002.0) for n in (10, 12)]
+    results = collected(tmp_path, rows, sweep=sweep, figures=figures)
+    assert lines_of(results) == {
+        "Re = 20001": ([10, 12], [20011.0, 20013.0]),
+        "Re = 20002": ([10, 12], [20012.0, 20014.0]),
+    }
+    assert "| 20002 " in results.to_markdown()
+    assert declare(sweep=Sweep(product={"time_step": [0.0254321, 1 / 3]})).points()[1].label.endswith(repr(1 / 3))
+
+
+def test_what_a_set_does_not_name_is_as_it_is_without(tmp_path):
+    figures = [Figure(name="decay", x="resolution", y=[DECAY], where={"run.until": 0.2})]
+    sweep = Sweep(product={"resolution": [10, 12]}, sets=[{}, {"reynolds": 200}, {"run.until": 0.3}])
+    base = VORTEX | {"reynolds": 50}
+    rows = [
+        ({"resolution": n, "reynolds": re, "run.until": until}, n * re)
+        for n in (10, 12)
+        for re, until in ((50, 0.2), (200, 0.2), (50, 0.3))
+    ]
+    results = collected(tmp_path, rows, base=base, sweep=sweep, figures=figures)
+    found = lines_of(results)
+    assert [points for name, points in found.items() if "Re = 50" in name] == [([10, 12], [500.0, 600.0])]
+    assert [points for name, points in found.items() if "Re = 200" in name] == [([10, 12], [2000.0, 2400.0])]
+    assert len(found) == 2
+
+
+def test_each_series_has_its_own_reference(tmp_path):
+    figures = [Figure(name="decay", x="resolution", y=[DECAY])]
+    sweep = Sweep(product={"reynolds": [50, 200], "resolution": [10, 12]})
+    rows = [({"reynolds": re, "resolution": n}, 1.0) for re in (50, 200) for n in (10, 12)]
+    found = lines_of(collected(tmp_path, rows, [3.0, 3.0, 0.5, 0.5], sweep=sweep, figures=figures))
+    assert found["reference, Re = 50"] == ([10, 12], [3.0, 3.0])
+    assert found["reference, Re = 200"] == ([10, 12], [0.5, 0.5])
+    found = lines_of(collected(tmp_path, rows, [3.0, 3.0, 3.0, 3.0], sweep=sweep, figures=figures))
+    assert found["reference"] == ([10, 12], [3.0, 3.0]) and len(found) == 3
+
+
+def test_published_values_are_drawn_where_they_belong(tmp_path):
+    published = [
+        Published(label=f"other {n}", parameters={"reynolds": 50, "resolution": n}, values={DECAY: 1.0 * n})
+        for n in (10, 12, *(9 * [12]))
+    ]
+    published = [other.replace(label=f"{other.label}, {k}") for k, other in enumerate(published)]
+    figures = [Figure(name="decay", x="reynolds", y=[DECAY], where={"resolution": 12})]
+    sweep = Sweep(product={"reynolds": [50, 200], "resolution": [10, 12]})
+    rows = [({"reynolds": re, "resolution": n}, 1.0) for re in (50, 200) for n in (10, 12)]
+    results = collected(tmp_path, rows, sweep=sweep, figures=figures, published=published)
+    assert sum(name.startswith("other 12") for name in lines_of(results)) == 10
+    assert not any(name.startswith("other 10") for name in lines_of(results))
+    for other, message in (
+        (
+            Published(label="a", parameters={"reynold": 50}, values={}),
+            "published a, parameters: no parameter 'reynold'",
+        ),
+        (Published(label="a", values={"decay rat": 1.0}), "published a, values: no result 'decay rat'"),
+    ):
+        wrong = declare(published=[other])
+        with pytest.raises(ConfigError, match=message):
+            study.check_names(wrong, wrong.points())
+
+
+def test_a_figure_that_cannot_be_drawn_is_told_of(tmp_path):
+    figures = [Figure(name="decay", x="reynolds", y=[DECAY], where={"resolution": 13})]
+    sweep = Sweep(product={"reynolds": [50], "resolution": [12]})
+    results = collected(tmp_path, [({"reynolds": 50, "resolution": 12}, 1.0)], sweep=sweep, figures=figures)
+    assert results.warnings == ["figure decay: not drawn, no finished run has resolution = 13"] and not results.draw()
 
 
 def test_never_more_threads_than_cores():

@@ -44,8 +44,9 @@ const GRAIN: f64 = 1.0 / (1u64 << 30) as f64;
 /// Solids less deep than this [Δx] lie under the surface.
 const LAYER: f64 = 0.75;
 
-/// How far [Δx] from where its velocity takes it a body may be that a rule moves.
-const JUMP: f64 = 0.5;
+/// How far [Δx] from where its velocity takes it a particle of a body may be that a rule moves: if that velocity is the same before and
+/// after, and at most.
+const JUMP: [f64; 2] = [0.05, 0.5];
 
 /// The poses of all bodies that a rule moves, in their order, at a time.
 pub type MotionRule = Box<dyn FnMut(f64) -> Result<Vec<Pose>> + Send + Sync>;
@@ -227,12 +228,19 @@ impl<const D: usize> Motion<D> {
         self.tell(rule, time + fraction * time_step, Moment::Frame)?;
         self.tell(rule, time + time_step, Moment::End)?;
         for body in self.bodies.iter().filter(|body| body.rigid.is_none()) {
-            let Moving { start, end, .. } = body;
-            let way = (start.velocity + end.velocity) * (0.5 * time_step);
-            let jump = (end.displacement - start.displacement - way).norm();
-            if jump > JUMP * self.spacing {
-                let problem = format!("jumps at time {time:.6}: a body comes {jump:.3} beside what its velocity says");
-                return Err(Error::Array { name: "motion", problem });
+            let Moving { start, end, radius, .. } = body;
+            let moves = (end.displacement - start.displacement, start.velocity, end.velocity, "comes", 1.0);
+            let turns = (end.turned_since::<D>(start), start.spin, end.spin, "turns", *radius);
+            for (way, before, after, what, arm) in [moves, turns] {
+                let beside = (way - (before + after) * (0.5 * time_step)).norm();
+                // Where the velocity changes at once, within the step, as much as this is no jump.
+                let kink = 0.5 * (after - before).norm() * time_step;
+                let [least, most] = JUMP.map(|jump| jump * self.spacing);
+                if beside * arm > (least + 1.1 * kink * arm).min(most) {
+                    let problem =
+                        format!("jumps at time {time:.6}: a body {what} {beside:.3} beside what its velocity says");
+                    return Err(Error::Array { name: "motion", problem });
+                }
             }
         }
         Ok(())

@@ -81,6 +81,15 @@ impl Pose {
         std::array::from_fn(|k| all[k / 3][k % 3])
     }
 
+    /// Rotation vector from an earlier pose to this one.
+    pub(super) fn turned_since<const D: usize>(&self, earlier: &Self) -> Vector3<f64> {
+        if D == 2 {
+            self.angle - earlier.angle
+        } else {
+            (Rotation3::from_scaled_axis(self.angle) * Rotation3::from_scaled_axis(-earlier.angle)).scaled_axis()
+        }
+    }
+
     /// After `time` with the same acceleration.
     pub(super) fn after<const D: usize>(&self, time: f64) -> Self {
         let (velocity, spin) = (self.velocity + self.acceleration * time, self.spin + self.angular_acceleration * time);
@@ -98,7 +107,8 @@ impl Pose {
 
 impl Pose {
     /// Accelerate a free body as force and torque, and its own, ask for. The fluid answers at once with a mass and a moment of inertia. Springs
-    /// and dampers act as they will after the time `ahead`, in the middle of the step: with those of its start, energy would be made.
+    /// and dampers act, and the body stands and turns, as they will after the time `ahead`, in the middle of the step: with those of its start,
+    /// energy would be made, and angular momentum.
     pub(super) fn respond<const D: usize>(
         &mut self,
         rigid: &Rigid,
@@ -114,13 +124,14 @@ impl Pose {
         let moves = |k: usize| k < D && free[k];
         let acceleration = (total + self.following.now() * added_mass) / (mass + added_mass);
         self.acceleration = Vector3::from_fn(|k, _| if moves(k) { acceleration[k] } else { 0.0 });
-        let turn = Rotation3::from_scaled_axis(self.angle);
+        let middle = self.after::<D>(ahead);
+        let turn = Rotation3::from_scaled_axis(middle.angle);
         let own_axes = match inertia[..] {
             [only] => Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, only)),
             _ => Matrix3::from_row_slice(inertia),
         };
         let inertia = turn * own_axes * turn.inverse();
-        let gyroscopic = if D == 2 { Vector3::zeros() } else { self.spin.cross(&(inertia * self.spin)) };
+        let gyroscopic = if D == 2 { Vector3::zeros() } else { middle.spin.cross(&(inertia * middle.spin)) };
         let mut twist = torque - gyroscopic + self.angular_following.now() * added_inertia;
         let mut inertia = inertia + Matrix3::identity() * added_inertia;
         // About the other axes what holds the body answers any torque.

@@ -23,7 +23,7 @@ from alsph.folder.durable import write_text
 from alsph.geometry.shape import Shape
 from alsph.results.outcome import changes
 from alsph.results.run import Run
-from alsph.study.declaration import text
+from alsph.study.declaration import text, typed
 from alsph.symbols import Symbols, in_common
 from alsph.tables import markdown
 from alsph.text import in_figure, printable, shown
@@ -234,11 +234,11 @@ def _parameters(run: Run) -> dict[str, str]:
 
 
 def _parameter(value: Any) -> str:
-    if value is None:
-        return "not given"
     if isinstance(value, Shape):
         return f"{value}{_sum(value.sha256)}"
-    return text(value) if isinstance(value, int | float) else shown(value if isinstance(value, list) else str(value))
+    if value is None or isinstance(value, int | float):
+        return typed(value)
+    return shown(value if isinstance(value, list) else str(value))
 
 
 def _sum(sha256: str) -> str:

@@ -24,6 +24,12 @@ from alsph.running import beginning
 UNHASHED = ("threads", "checkpoint_minutes", "flush_seconds")
 """Settings of a run that change nothing in its results."""
 
+RUNS = "runs"
+"""Name of the folder with the run folders of a study."""
+
+COLUMNS = ("status", "time", "seconds", "remarks", "folder")
+"""What the rows of a study tell of each run beside its parameters and results."""
+
 
 class Sweep(Parameters):
     """The values that parameters take. All that are given are combined with each other.
@@ -50,6 +56,14 @@ class Sweep(Parameters):
         for name, values in [*self.product.items(), *self.together.items(), *self.until_diverged.items()]:
             if not values:
                 raise ValueError(f"{name}: has no values")
+        ways = {"product": {*self.product}, "together": {*self.together}, "until_diverged": {*self.until_diverged}}
+        ways["sets"] = {name for parameters in self.sets for name in parameters}
+        for one, other in itertools.combinations(ways, 2):
+            for name in sorted(ways[one] & ways[other]):
+                raise ValueError(f"{name}: stands in {one} and in {other}; sweep it in one of them")
+        for name, values in (self.product | self.together | self.until_diverged).items():
+            if name in {f"run.{name}" for name in UNHASHED} and len(values) > 1:
+                raise ValueError(f"{name}: changes nothing in the results, so all its runs would be one")
         return self
 
     def ladders(self) -> Iterator[list[dict[str, Any]]]:
@@ -96,6 +110,11 @@ class Figure(Parameters):
                 field_style(name)
         if self.view and len(self.view) != 4:
             raise ValueError(f"figure {self.name}: view must be left, right, bottom and top, not {self.view}")
+        for name in self.labels:
+            if name not in (drawn := [self.x, *self.y]):
+                raise ValueError(f"figure {self.name}: labels.{name}: is not drawn; {suggest(name, drawn)}")
+        if len({self.labels.get(y, y) for y in self.y}) < len(self.y):
+            raise ValueError(f"figure {self.name}: two of y have the same name or label")
         return self
 
     @property
@@ -144,7 +163,7 @@ class Point:
     @property
     def label(self) -> str:
         """The swept parameters in words."""
-        return ", ".join(f"{name} {text(value)}" for name, value in self.parameters.items()) or self.config.case.name
+        return ", ".join(f"{name} {typed(value)}" for name, value in self.parameters.items()) or self.config.case.name
 
     def tables(self, runs: Path) -> dict[str, Any]:
         """Return the tables of the configuration, `runs` being the folder of the study's run folders."""
@@ -171,6 +190,19 @@ class Study(Parameters):
     folder: str = Field(default="", description="folder that paths of outlines start from; that of the study's file")
 
     @model_validator(mode="after")
+    def _named(self) -> Self:
+        _check_shape({"base": self.base, "start": self.start})
+        if self.name == RUNS:
+            raise ValueError(f"name: {RUNS} is the folder of the run folders; call the study otherwise")
+        for name in self.swept:
+            if name in COLUMNS:
+                raise ValueError(f"sweep: {name}: a column of the results is called so; call the parameter otherwise")
+        names = [figure.name for figure in self.figures]
+        for name in {name for name in names if names.count(name) > 1}:
+            raise ValueError(f"figure {name}: two figures are called so")
+        return self
+
+    @model_validator(mode="after")
     def _drawable(self) -> Self:
         for figure in self.figures:
             for name in filter(None, (figure.x, figure.finest, *figure.where)):
@@ -191,16 +223,6 @@ class Study(Parameters):
         listed = [name for parameters in sweep.sets for name in parameters]
         return list(dict.fromkeys([*sweep.product, *sweep.together, *listed, *sweep.until_diverged]))
 
-    @property
-    def varied(self) -> set[str]:
-        """Names of the swept parameters that take more than one value."""
-        values: dict[str, list[Any]] = {}
-        for ladder in self.sweep.ladders():
-            for parameters in ladder:
-                for name, value in parameters.items():
-                    values.setdefault(name, []).append(value)
-        return {name for name, taken in values.items() if any(value != taken[0] for value in taken)}
-
     def points(self) -> list[Point]:
         """Return the runs of the study, each once, in the order of the declaration.
 
@@ -213,9 +235,17 @@ class Study(Parameters):
         for ladder in self.sweep.ladders():
             previous = None
             for parameters in ladder:
-                previous = Point(parameters, self._config(parameters), previous, self._start(parameters))
+                config = self._config(parameters)
+                every = {name: parameters.get(name, self._unswept(name, config)) for name in self.swept}
+                previous = Point(every, config, previous, self._start(parameters))
                 points.setdefault(previous.name, previous)
         return list(points.values())
+
+    def _unswept(self, name: str, config: Config) -> Any:
+        """Return what a run has of a parameter that others are swept over, and it is not."""
+        where, _, key = name.rpartition(".")
+        given, made = (self.base.get("run", {}), config.run) if where else (self.base, config.case)
+        return given.get(key, getattr(made, key))
 
     def _start(self, parameters: Mapping[str, Any]) -> Point | None:
         """Return the run that the one with these parameters starts with."""
@@ -306,6 +336,7 @@ def _parsed(tables: dict[str, Any], preset: str | None) -> Study:
         raise ConfigError(f"unknown preset '{preset}'; {known}")
     if presets:
         tables = _merged(tables, presets[preset or next(iter(presets))])
+        _check_shape(tables)
     tables["figures"] = [_figure(number, table) for number, table in enumerate(tables.pop("figure", []), 1)]
     tables["published"] = [Published(**table) for table in tables.pop("published", [])]
     tables["sweep"] = Sweep(**tables.get("sweep", {}))
@@ -351,5 +382,12 @@ def _flat(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def text(value: Any) -> str:
-    """Return the value of a parameter as it is shown."""
+    """Return a result as it is shown."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def typed(value: Any) -> str:
+    """Return the value of a parameter as it is shown: two that differ do so in words, too."""
+    if isinstance(value, float):
+        return short if float(short := f"{value:.6g}") == value else repr(float(value))
+    return "not given" if value is None else str(value)

@@ -12,9 +12,9 @@ from typing import Any, Protocol
 
 from alsph.errors import AlsphError, ConfigError, RunFolderError, WalltimeError
 from alsph.study.board import Board
-from alsph.study.declaration import Point, Study, load, with_starts
+from alsph.study.declaration import RUNS, Point, Study, load, with_starts
 from alsph.study.results import Results, check_names
-from alsph.study.state import ENDED, RUNS, State, states
+from alsph.study.state import ENDED, State, states
 from alsph.study.worker import perform, stop_request
 
 POLL_SECONDS = 0.5

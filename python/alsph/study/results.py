@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,8 +25,8 @@ from alsph.folder.run_folder import RunFolder
 from alsph.parameters import suggest
 from alsph.plotting.curves import Curve
 from alsph.results.run import Run
-from alsph.study.declaration import Figure, Point, Study, text
-from alsph.study.state import ENDED, RUNS, State, states
+from alsph.study.declaration import RUNS, Figure, Point, Study, text, typed
+from alsph.study.state import ENDED, State, states
 from alsph.symbols import Symbols, in_common
 from alsph.tables import html, markdown
 from alsph.text import in_figure, printable
@@ -64,12 +65,17 @@ def check_names(study: Study, points: Sequence[Point]) -> None:
         results.update(measures)
         profiles.update(curves)
     wanted = [("collect", name, results | {RULE}) for name in study.collect]
+    parameters = {*study.swept, *(name for config in kinds.values() for name in config.case.parameter_names())}
+    for other in study.published:
+        wanted += [(f"published {other.label}, parameters", name, parameters) for name in other.parameters]
+        wanted += [(f"published {other.label}, values", name, results) for name in other.values]
     for figure in study.figures:
         wanted += [(f"figure {figure.name}, y", name, results) for name in figure.curves]
         wanted += [(f"figure {figure.name}, profile", name, profiles) for name in filter(None, [figure.profile])]
     for where, name, known in wanted:
         if name not in known and not name.startswith(tuple(begin for begin in known if begin.endswith("= "))):
-            raise ConfigError(f"{where}: no result '{name}'; {suggest(name, sorted(known))}")
+            what = "parameter" if known is parameters else "result"
+            raise ConfigError(f"{where}: no {what} '{name}'; {suggest(name, sorted(known))}")
 
 
 def names(config: Config) -> tuple[set[str], set[str]]:
@@ -144,10 +150,14 @@ class Results:
         known = {name for row in self.found for name in row}
         wanted = [("collect", name) for name in self.study.collect]
         wanted += [(f"figure {figure.name}, y", y) for figure in self.study.figures for y in figure.curves]
-        return [
+        missing = [
             f"{where}: no result '{name}'; {suggest(name, known)}"
             for where, name in wanted
             if name not in known and known
+        ]
+        empty = [figure for figure in self.study.figures if known and not self._chosen(figure)]
+        return missing + [
+            f"figure {figure.name}: not drawn, no finished run has {_in_words(self._where(figure))}" for figure in empty
         ]
 
     @property
@@ -198,15 +208,20 @@ class Results:
 
     def _table(self) -> str:
         columns = [name for name in self._columns() if name not in ("folder", "seconds")]
-        lines = [[_shown(row.get(name, "")) for name in columns] for row in self.rows]
+        lines = [self._words(row, columns) for row in self.rows]
         for published in self.study.published:
             values = published.parameters | {"status": published.label} | published.values
-            lines.append([_shown(values.get(name, "")) for name in columns])
+            lines.append(self._words(values, columns))
         lines += [
-            [_shown((parameters | {"status": "reference"} | known).get(name, "")) for name in columns]
+            self._words(parameters | {"status": "reference"} | known, columns)
             for parameters, known in self._distinct_references()
         ]
         return markdown(columns, lines)
+
+    def _words(self, row: Mapping[str, Any], columns: Sequence[str]) -> list[str]:
+        """Return the cells of a row, parameters as they were given and results rounded."""
+        swept = self.study.swept
+        return ["" if name not in row else (typed if name in swept else _shown)(row[name]) for name in columns]
 
     def _distinct_references(self) -> list[tuple[dict[str, Any], dict[str, float]]]:
         """Return each set of reference values once, with the parameters that all its runs share."""
@@ -230,7 +245,7 @@ class Results:
 
     def _repr_html_(self) -> str:
         columns = [name for name in self._columns() if name != "folder"]
-        return html(columns, [[_shown(row.get(name, "")) for name in columns] for row in self.rows])
+        return html(columns, [self._words(row, columns) for row in self.rows])
 
     @property
     def symbols(self) -> Symbols:
@@ -259,45 +274,57 @@ class Results:
 
     def _chosen(self, figure: Figure) -> list[int]:
         """Return the finished runs that a figure shows."""
-        where = dict(figure.where)
-        if figure.finest:
-            where[figure.finest] = max((row[figure.finest] for row in self.rows if figure.finest in row), default=None)
+        where = self._where(figure)
         return [
             index
             for index, row in enumerate(self.rows)
             if row["status"] == "finished" and all(row.get(name) == value for name, value in where.items())
         ]
 
+    def _where(self, figure: Figure) -> dict[str, Any]:
+        """Return the parameters that the runs of a figure have."""
+        where = dict(figure.where)
+        if figure.finest:
+            where[figure.finest] = max(row[figure.finest] for row in self.rows)
+        return where
+
     def _series(self, row: Mapping[str, Any], without: str = "") -> str:
         """Return the name of the series that a run belongs to, in the paper's form."""
         parts = []
         for name in self.study.swept:
-            if name != without and name in row and name in self.study.varied:
-                parts.append(_LEGEND.get(name, "{name} {value}").format(name=name, value=in_figure(text(row[name]))))
+            if name != without and any(other[name] != self.rows[0][name] for other in self.rows):
+                parts.append(_LEGEND.get(name, "{name} {value}").format(name=name, value=in_figure(typed(row[name]))))
         return ", ".join(parts)
 
     def _curves(self, figure: Figure) -> Picture | None:
         chosen = self._chosen(figure)
         panels: dict[str, list[Curve]] = {}
         for y in figure.y:
-            series: dict[str, list[tuple[float, Any]]] = {}
-            known: dict[float, float] = {}
+            series: dict[str, list[tuple[Any, Any]]] = {}
+            known: dict[str, list[tuple[Any, float]]] = {}
             for index in chosen:
                 row = self.rows[index]
-                if not _is_nan(self.found[index].get(y)) and not _is_nan(row.get(figure.x)):
-                    series.setdefault(self._series(row, figure.x), []).append((row[figure.x], self.found[index][y]))
+                name = self._series(row, figure.x)
+                if not _is_nan(self.found[index].get(y)) and row[figure.x] is not None:
+                    series.setdefault(name, []).append((row[figure.x], self.found[index][y]))
                 if y in self.references[index]:
-                    known[row[figure.x]] = self.references[index][y]
+                    known.setdefault(name, []).append((row[figure.x], self.references[index][y]))
             curves = [Curve(name, *_sorted(points)) for name, points in series.items()]
             early = [point for points in series.values() for point in points if remark(point[1])]
             if early:
                 curves.append(Curve(DEVELOPING, *_sorted(early)[:2], style="x", colour="k"))
-            if known:
-                curves.append(Curve("reference", *_sorted(list(known.items())), style="d--", colour="k"))
+            shared = _shared(known)
+            curves += [
+                Curve(", ".join(filter(None, ("reference", *names))), *_sorted(points), style="d--", colour="k")
+                for names, points in ([((), points) for _, points in shared] if len(shared) == 1 else shared)
+            ]
+            where = self._where(figure)
             curves += [
                 Curve(other.label, [other.parameters[figure.x]], [other.values[y]], style=marker, colour="k")
-                for other, marker in zip(self.study.published, _MARKERS, strict=False)
-                if figure.x in other.parameters and y in other.values
+                for other, marker in zip(self.study.published, itertools.cycle(_MARKERS), strict=False)
+                if figure.x in other.parameters
+                and y in other.values
+                and all(other.parameters.get(name, value) == value for name, value in where.items())
             ]
             panels[figure.labels.get(y, y)] = curves
         if not any(panels.values()):
@@ -369,10 +396,29 @@ def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, fl
         return {"message": str(error)}, {}, {}
 
 
+def _shared(known: Mapping[str, list[tuple[Any, float]]]) -> list[tuple[list[str], list[tuple[Any, float]]]]:
+    """Return reference values with the names of the series that they are of, each set once."""
+    found: list[tuple[list[str], list[tuple[Any, float]]]] = []
+    for name, points in known.items():
+        for names, others in found:
+            theirs = [(x, value) for x, value in others if any(x == own for own, _ in points)]
+            if all(point in points for point in theirs):
+                names.append(name)
+                others += [point for point in points if point not in others]
+                break
+        else:
+            found.append(([name], list(points)))
+    return found
+
+
+def _in_words(parameters: Mapping[str, Any]) -> str:
+    return " and ".join(f"{name} = {typed(value)}" for name, value in parameters.items())
+
+
 def _sorted(points: list[tuple[Any, Any]]) -> tuple[list[float], list[float], list[float]]:
     """Return abscissae, numbers increasing and words as they come, with ordinates and the uncertainties of these."""
-    if any(isinstance(x, str) for x, _ in points):
-        points = [(str(x), y) for x, y in points]
+    if not all(isinstance(x, int | float) for x, _ in points):
+        points = [(typed(x), y) for x, y in points]
     else:
         points = sorted(points, key=lambda point: point[0])
     bars = [_uncertainty(y) or 0.0 for _, y in points]

@@ -26,9 +26,9 @@ from alsph.parameters import choose
 from alsph.plotting.curves import Curve
 from alsph.results.run import Run
 from alsph.study.comparison import CPU, STEPS, Comparison, costs_of
-from alsph.study.declaration import Study, Sweep
+from alsph.study.declaration import RUNS, Study, Sweep
 from alsph.study.results import Results
-from alsph.study.state import RUNS, State
+from alsph.study.state import State
 from alsph.symbols import Symbols
 from alsph.tables import markdown
 from alsph.text import printable, sha256

@@ -7,11 +7,10 @@ from pathlib import Path
 
 from alsph.errors import RunFolderError
 from alsph.folder.run_folder import UNFINISHED, RunFolder
-from alsph.study.declaration import Point, with_starts
+from alsph.study.declaration import RUNS, Point, with_starts
 from alsph.text import printable
 
 ENDED = ("finished", "diverged", "skipped")
-RUNS = "runs"
 TAIL_BYTES = 4096
 
 
