@@ -2,6 +2,7 @@
 
 import math
 
+import alsph
 import numpy as np
 import pytest
 from alsph.analysis.averages import Estimate
@@ -9,7 +10,7 @@ from alsph.cases import Cylinder, TaylorGreen
 from alsph.config import Config, RunSettings
 from alsph.errors import ConfigError
 from alsph.study import convergence
-from alsph.study.convergence import converge, grid_convergence
+from alsph.study.convergence import _no_order, converge, grid_convergence
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -90,3 +91,40 @@ def test_changes_within_their_uncertainties_tell_no_order():
     values[1] = Estimate(1.50, math.inf)  # which goes on to change, and tells nothing
     assert grid_convergence("mean drag coefficient", [10, 14, 20], values).kind == "unknown"
     assert sharp.kind == "monotonic" and sharp.order == pytest.approx(2.72, abs=0.01)
+
+
+def test_what_is_no_ladder_or_case_is_said(tmp_path):
+    vortex = TaylorGreen()
+    for arguments, message in (
+        (("taylor_green", [8, 9, 10]), "config = 'taylor_green': must be a case such as"),
+        ((vortex, 8), "resolutions = 8: must be a list of whole numbers"),
+        ((vortex, ["8", 9, 10]), "resolutions = '8': must be a whole number, 1 or more"),
+        ((vortex, [8, 9, 9]), "convergence needs three or more"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            converge(*arguments, output=tmp_path, progress=False)
+    with pytest.raises(ConfigError, match="resolutions = 20: must be a list"):
+        alsph.validate("taylor_green", resolutions=20, output=tmp_path, progress=False)
+    with pytest.raises(ConfigError, match="resolutions = 8: must be a list"):
+        alsph.compare_schemes(vortex, ["alsph", "isph"], 8, output=tmp_path, progress=False)
+    for wrong, message in (
+        ({"study": None}, "study = None: must be the name of a study"),
+        ({"jobs": "1"}, "jobs = '1': must be a whole number"),
+        ({"threads": "1"}, "threads = '1': must be a whole number"),
+        ({"walltime": "1:00"}, r"walltime = '1:00': must be a number above zero \[s\]"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            alsph.study.run(**{"study": "reynolds", "output": tmp_path / "none", "progress": False} | wrong)
+    with pytest.raises(ConfigError, match="two run folders or more"):
+        alsph.compare(path for path in ())
+
+
+@pytest.mark.parametrize(
+    ("values", "reference", "told"),
+    [((1.0, 2.0, 2.0), 1.0, "the last two are the same"), ((1.0, 1.9, 1.901), 1.0, "faster than Δx^8")],
+)
+def test_why_there_is_no_order_is_said(values, reference, told):
+    found = grid_convergence("a", (8, 16, 32), values, reference)
+    assert found.kind == "monotonic" and math.isnan(found.order)
+    assert _no_order(found) == told
+    assert not _no_order(grid_convergence("a", (8, 16, 32), (1.0, 1.75, 1.9375)))

@@ -135,6 +135,18 @@ def test_files_that_cannot_be_used_are_refused_with_their_name(tmp_path):
         study.load("reynolds", "fast")
 
 
+def test_which_preset_is_on_is_told(tmp_path, alsph):
+    path = tmp_path / "study.toml"
+    path.write_text(
+        'name = "a"\nbase = {case = "taylor_green"}\n[preset.quick]\nsweep.product.resolution = [8]\n'
+        "[preset.fine]\nsweep.product.resolution = [16]\n"
+    )
+    for arguments, told in (([], "preset quick"), (["--preset", "fine"], "preset fine")):
+        code, output, _ = alsph("study", "run", path, "-o", tmp_path / "out", "--dry-run", *arguments)
+        assert code == 0 and output.startswith(told)
+    assert study.load(path).in_words == "a, preset quick"
+
+
 def test_runs_that_start_with_the_flow_of_another_are_known_by_it():
     """Starts are shared where nothing that is left of the point's own parameters differs."""
     plain = declare().points()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from alsph import config
 from alsph.analysis.averages import Estimate
-from alsph.cases import BackwardFacingStep, Cylinder, TaylorGreen
+from alsph.cases import BackwardFacingStep, Cylinder, Sphere, TaylorGreen
 from alsph.errors import ConfigError
 from alsph.results.dimensional import dimensional
 from alsph.running.describe import describe
@@ -189,6 +189,8 @@ def test_names_of_results_in_si():
         "mean drag coefficient, pressure part": Estimate(1.0, 0.1, "a note"),
         "mean lift coefficient of body_1": Estimate(2.0),
         "mean lift coefficient of body_1, reference": Estimate(3.0),
+        "drag coefficient of body_1 over that of body_2": Estimate(0.5),
+        "drag coefficient of Morison": Estimate(2.0),
         "largest error of the pressure coefficient beyond 10 degrees": Estimate(0.1),
         "mean pitching moment coefficient about c/4": Estimate(1.0),
         "Strouhal number": Estimate(0.2),
@@ -218,6 +220,14 @@ def test_names_of_results_in_si():
     assert (drag.uncertainty, drag.note) == (pytest.approx(4.5), "a note")
     in_space = dimensional(results, units, 3, area=0.5, chord=1.0)
     assert in_space["mean drag, pressure part, N"] == pytest.approx(45.0)
+
+
+def test_forces_in_si_are_those_on_the_whole_body(tmp_path):
+    case = Sphere(reynolds=100, resolution=8, length=3, height=3, width=3, upstream=1.25, quarter=True)
+    run = case.run(tmp_path / "run", until=0.1, threads=1, progress=False)
+    units = Units(**WATER | {"velocity": 0.005})
+    force = run.drag.mean * 0.5 * 1000 * 0.005**2 * 0.02**2 * case.reference_area * 4
+    assert run.dimensional(units)["mean drag, N"] == pytest.approx(force)
 
 
 def test_wrong_quantities_are_told():

@@ -2,6 +2,7 @@
 
 import math
 import operator
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,19 @@ def whole(name: str, value: Any, least: int | None = None) -> int:
     if abs(number) > MOST:
         raise ConfigError(f"{name} = {shown(value)}: too large")
     return number
+
+
+def ladder(name: str, values: Any) -> list[int]:
+    """Return whole numbers above zero, each once, increasing.
+
+    Raises
+    ------
+    ConfigError
+        If they are none; the message begins with `name`.
+    """
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise ConfigError(f"{name} = {shown(values)}: must be a list of whole numbers")
+    return sorted({whole(name, value, 1) for value in values})
 
 
 def number(name: str, value: Any, above: float | None = None, unit: str = "", *, finite: bool = False) -> float:

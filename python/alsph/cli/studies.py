@@ -142,6 +142,8 @@ def _print_states(declared: "alsph.study.Study", output: Path) -> None:
     from alsph.study.declaration import with_starts
 
     points = declared.points()
+    if declared.preset:
+        say(f"preset {declared.preset} (--preset)")
     for line in overview(with_starts(points), alsph.study.states(points, output)):
         say(printable(line))
     if remarked := tally([keywords(point.config.case.remarks()) for point in points]):

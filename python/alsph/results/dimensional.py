@@ -22,6 +22,9 @@ IN_UNITS: dict[str, Quantity] = {
 
 REFERENCE = ", reference"
 
+FORCE = re.compile(r"\b(drag|lift) coefficient\b(?!.*\b(over|Morison)\b)")
+"""What a result is called that is a force; a ratio of two is none, nor is a part of one that swings."""
+
 
 def dimensional(
     results: Mapping[str, Any],
@@ -42,7 +45,7 @@ def dimensional(
     dimensions
         Number of space dimensions: in 2-D forces are per length.
     area
-        A that force coefficients are formed with, a length in 2-D [D], an area in 3-D [D²].
+        A that force coefficients are formed with, of the whole body: a length in 2-D [D], an area in 3-D [D²].
     chord
         Length c that moment coefficients are formed with [D].
     symbols
@@ -66,7 +69,7 @@ def _known(
     """Return what a result is called in SI, its quantity, and the share of its unit that it is given in."""
     if name == "Strouhal number":
         return "shedding frequency", "frequency", 1.0
-    if re.search(r"\b(drag|lift) coefficient\b", name):
+    if FORCE.search(name):
         force: Quantity = "force_per_length" if dimensions == 2 else "force"
         return name.replace(" coefficient", ""), force, 0.5 * area
     if "moment coefficient" in name and dimensions == 2:

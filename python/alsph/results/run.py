@@ -154,6 +154,8 @@ class Run(Loads):
     def dimensional(self, units: Units | None = None) -> dict[str, Estimate]:
         """Return the main results that have a dimension in SI, by their names with the unit, as ``mean drag, N/m``.
 
+        Forces are those on the whole body, of which a quarter may be computed.
+
         Parameters
         ----------
         units : Units, optional
@@ -169,7 +171,7 @@ class Run(Loads):
             case = case.replace(units=units, reynolds=case.reynolds)
         if case.units is None:
             raise ConfigError(f"{self.path}: its case has no units; use run.dimensional(alsph.Units(...))")
-        lengths = case.reference_area, case.chord
+        lengths = case.reference_area / case.computed_share, case.chord
         return dimensional(self._results(), case.units, case.space_dimensions, *lengths, case.symbols)
 
     def summary(self) -> dict[str, Any]:

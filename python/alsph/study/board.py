@@ -45,7 +45,7 @@ class Board:
 
     def __enter__(self) -> Self:
         """Show the table."""
-        self.say(f"study {self.study.name}: {len(self.points)} runs in {self.output}")
+        self.say(f"study {self.study.in_words}: {len(self.points)} runs in {self.output}")
         if self.live:
             self.live.start()
         return self

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -197,7 +197,7 @@ def compare(runs: Sequence[Run | str | Path]) -> Comparison:
     RunFolderError
         If one is no run folder, or none has begun.
     """
-    if isinstance(runs, Run | str | Path) or len(runs) < 2:
+    if isinstance(runs, Run | str | Path) or not isinstance(runs, Iterable) or len(runs := [*runs]) < 2:
         raise ConfigError("a comparison needs two run folders or more")
     opened = [run if isinstance(run, Run) else Run(run) for run in runs]
     places = [run.path.resolve() for run in opened]

@@ -13,6 +13,9 @@ import numpy as np
 
 from alsph import plotting, study
 from alsph.analysis.averages import remark
+from alsph.arguments import ladder
+from alsph.cases.base import Case
+from alsph.cases.remarks import tally
 from alsph.config import Config
 from alsph.errors import ConfigError
 from alsph.folder.durable import write_text
@@ -21,6 +24,7 @@ from alsph.results.run import Run
 from alsph.study import Results, Study, Sweep
 from alsph.study.declaration import digest
 from alsph.tables import markdown
+from alsph.text import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -189,7 +193,7 @@ class Report:
             [
                 found.name,
                 *(str(v) if 0 < _uncertainty(v) < np.inf else f"{v:.5g}{remark(v)}" for v in found.values),
-                found.kind,
+                ", ".join(filter(None, (found.kind, _no_order(found)))),
                 _shown(found.order, ".2f"),
                 _shown(found.richardson, ".5g"),
                 _shown(100 * found.index, ".2g", " %"),
@@ -215,6 +219,8 @@ class Report:
                 curves.append(Curve("reference", [0.0, max(spacing)], [found.reference] * 2, style="--", colour="k"))
             panels[found.name] = curves
         figure = plotting.panels(panels, r"$\Delta x/D$")
+        plotting.head(figure, self.results.study.title)
+        plotting.remark(figure, tally([row.get("remarks", "") for row in self.results.rows]))
         plotting.rename(figure, self.results.symbols)
         return figure
 
@@ -231,7 +237,7 @@ class Report:
 
 
 def converge(
-    config: Config,
+    config: Config | Case,
     resolutions: Sequence[int],
     output: str | Path = "runs/studies",
     *,
@@ -258,29 +264,42 @@ def converge(
     ConfigError
         If there are fewer than three resolutions, or the case cannot be made at one of them.
     """
-    ladder = sorted(set(resolutions))
-    if len(ladder) < 3:
-        raise ConfigError(f"resolutions = {ladder}: convergence needs three or more")
+    if not isinstance(config, Config):
+        if not isinstance(config, Case):
+            raise ConfigError(f"config = {shown(config)}: must be a case such as alsph.cases.Cylinder(), or a Config")
+        config = Config(config)
+    sizes = ladder("resolutions", resolutions)
+    if len(sizes) < 3:
+        raise ConfigError(f"resolutions = {sizes}: convergence needs three or more")
     declared = Study(
         name=f"converge-{config.case.name}-{digest(config, 'resolution')[:6]}",
         title=f"Convergence of {config.case.name}",
         base=config.tables(),
-        sweep=Sweep(product={"resolution": ladder}),
+        sweep=Sweep(product={"resolution": sizes}),
     )
     results = study.run(declared, output, progress=progress, **where)
     finished = [row for row in results.rows if row["status"] == "finished"]
     measures = [
         {measure.name: measure for measure in Run(results.path.parent / row["folder"]).measures} for row in finished
     ]
-    sizes = [row["resolution"] for row in finished]
+    reached = [row["resolution"] for row in finished]
     convergences = [
-        grid_convergence(name, sizes, [each[name].value for each in measures], measure.reference)
-        for name, measure in (measures[-1] if len(sizes) >= 3 else {}).items()
+        grid_convergence(name, reached, [each[name].value for each in measures], measure.reference)
+        for name, measure in (measures[-1] if len(reached) >= 3 else {}).items()
         if all(name in each for each in measures)
     ]
     report = Report(results.path, results, convergences)
     report.save()
     return report
+
+
+def _no_order(found: Convergence) -> str:
+    """Say why values that go one way tell no order; return nothing of others."""
+    if found.kind != "monotonic" or np.isfinite(found.order):
+        return ""
+    if found.values[-2] == found.values[-1]:
+        return "the last two are the same"
+    return f"faster than Δx^{LARGEST_ORDER:g}" if found.reference else "too coarse to extrapolate"
 
 
 def _uncertainty(value: float) -> float:

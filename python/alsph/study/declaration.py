@@ -187,6 +187,7 @@ class Study(Parameters):
     collect: list[str] = Field(default=[], description="results to tabulate; all if none are given")
     figures: list[Figure] = Field(default=[], description="figures to draw")
     published: list[Published] = Field(default=[], description="results of others")
+    preset: str = Field(default="", description="which of a file's presets it is")
     folder: str = Field(default="", description="folder that paths of outlines start from; that of the study's file")
 
     @model_validator(mode="after")
@@ -215,6 +216,11 @@ class Study(Parameters):
         if self.start and "initial_run" in self.base.get("run", {}):
             raise ValueError("start: base.run has an initial_run; give one of them (that of the starts is start.run's)")
         return self
+
+    @property
+    def in_words(self) -> str:
+        """Its name, and the preset."""
+        return f"{self.name}, preset {self.preset}" if self.preset else self.name
 
     @property
     def swept(self) -> list[str]:
@@ -335,8 +341,10 @@ def _parsed(tables: dict[str, Any], preset: str | None) -> Study:
         known = suggest(preset, presets) if presets else "the file has none"
         raise ConfigError(f"unknown preset '{preset}'; {known}")
     if presets:
-        tables = _merged(tables, presets[preset or next(iter(presets))])
+        preset = preset or next(iter(presets))
+        tables = _merged(tables, presets[preset])
         _check_shape(tables)
+        tables["preset"] = preset
     tables["figures"] = [_figure(number, table) for number, table in enumerate(tables.pop("figure", []), 1)]
     tables["published"] = [Published(**table) for table in tables.pop("published", [])]
     tables["sweep"] = Sweep(**tables.get("sweep", {}))

@@ -10,12 +10,14 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Protocol
 
+from alsph.arguments import number, whole
 from alsph.errors import AlsphError, ConfigError, RunFolderError, WalltimeError
 from alsph.study.board import Board
 from alsph.study.declaration import RUNS, Point, Study, load, with_starts
 from alsph.study.results import Results, check_names
 from alsph.study.state import ENDED, State, states
 from alsph.study.worker import perform, stop_request
+from alsph.text import shown
 
 POLL_SECONDS = 0.5
 
@@ -69,7 +71,9 @@ def run(
     WalltimeError
         When the wall time is used up, likewise.
     """
-    deadline = clock.monotonic() + walltime
+    deadline = clock.monotonic() + number("walltime", walltime, above=0, unit="s")
+    if not isinstance(study, Study | str | Path):
+        raise ConfigError(f"study = {shown(study)}: must be the name of a study, a TOML file, or a Study")
     study = study if isinstance(study, Study) else load(study, preset)
     output = Path(output)
     points = study.points()
@@ -95,11 +99,10 @@ def run(
 def _jobs(jobs: int | None, threads: int) -> int:
     """Return the number of local runs at a time: never more threads than cores."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if threads < 1:
-        raise ConfigError(f"threads = {threads}: must be 1 or more")
+    threads = whole("threads", threads, 1)
     if jobs is None:
         return max(1, cores // threads)
-    if jobs < 1 or (jobs > 1 and jobs * threads > cores):
+    if whole("jobs", jobs, 1) > 1 and jobs * threads > cores:
         raise ConfigError(
             f"jobs = {jobs}: {jobs} runs of {threads} threads each on {cores} cores; "
             f"use jobs = {max(1, cores // threads)} or less, 1 at least"

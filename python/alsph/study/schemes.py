@@ -15,6 +15,7 @@ from alsph import plotting, study
 from alsph.analysis.averages import Estimate
 from alsph.analysis.measures import Measure
 from alsph.analysis.noise import load_noise, pressure_noise
+from alsph.arguments import ladder
 from alsph.cases import find
 from alsph.cases.base import Case
 from alsph.cases.method import OWNERS, SCHEMES, of_all_schemes, of_scheme, superseded
@@ -309,8 +310,8 @@ def _declared(
         of_others = {*superseded({"scheme": scheme}, base)} - {*parameters}  # what was asked for stays
         gone = [name for name in base if name in of_others or name in superseded(own[scheme], base)]
         sets.append({"scheme": scheme} | dict.fromkeys(gone) | own[scheme])
-    ladder = {"resolution": sorted(set(resolutions))} if resolutions else {}
-    sweep = Sweep(product=ladder, sets=sets)
+    sizes = ladder("resolutions", resolutions)
+    sweep = Sweep(product={"resolution": sizes} if sizes else {}, sets=sets)
     points = Study(name="compare", base=base, sweep=sweep).points()
     case = points[0].config.case.name
     name = f"compare-{case}-{sha256(' '.join(point.name for point in points))[:6]}"

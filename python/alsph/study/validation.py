@@ -14,6 +14,7 @@ from rich.console import Console
 from alsph import cases, plotting
 from alsph.analysis import averages
 from alsph.analysis.measures import Measure
+from alsph.arguments import ladder
 from alsph.cases.remarks import keywords
 from alsph.config import Config
 from alsph.errors import ConfigError, SolverError
@@ -291,9 +292,9 @@ def validate(
     ConfigError, RunFolderError
         If a case or the folder cannot be used.
     """
-    entries = _chosen(names, full, suite)
-    if resolutions:
-        entries = [replace(entry, resolutions=tuple(sorted(set(resolutions)))) for entry in entries]
+    entries, sizes = _chosen(names, full, suite), ladder("resolutions", resolutions)
+    if sizes:
+        entries = [replace(entry, resolutions=tuple(sizes)) for entry in entries]
     report = Report(Path(output), [], [], {})
     jobs = [(entry, [*entry.configs(report.path, threads)]) for entry in entries]
     heading = _Heading([config for _, runs in jobs for _, config in runs], enabled=progress)
