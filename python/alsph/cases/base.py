@@ -285,8 +285,10 @@ class Case(Discretised):
         Raises
         ------
         ConfigError
-            If the particles would not fit into the memory that is free, or surfaces would slide through themselves.
+            If the particles would not fit into the memory that is free, surfaces would slide through themselves, or
+            what drives the flow has not the symmetry of what is computed.
         """
+        self.refuse_what_is_not_symmetric(self.rules)
         self.check_memory(threads)
         state = self.particles()
         self._warn_of_unused_velocities(state)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from abc import abstractmethod
+from collections.abc import Container
 from functools import cached_property
 from typing import ClassVar, Self
 
@@ -14,7 +15,7 @@ from pydantic import Field, model_validator
 from alsph.arrays import FloatArray
 from alsph.cases.dimensional import Dimensional
 from alsph.cases.method import Method
-from alsph.engine.prescribed import Rule, asked
+from alsph.engine.prescribed import WORDS, Rule, asked, asymmetry
 from alsph.errors import ConfigError
 from alsph.expressions import VectorExpression
 from alsph.geometry.domain import Domain, SolidBody
@@ -68,7 +69,33 @@ class Driven(Dimensional):
             raise ConfigError(f"body_motion = {shown(self.body_motion)}: {self.name} has no body to move")
         if self.surface_velocity is not None and not self.sliding_bodies:
             raise ConfigError(f"surface_velocity = {shown(self.surface_velocity)}: {self.name} has no body in place")
+        self.refuse_what_is_not_symmetric(self._expressions)
         return self
+
+    def refuse_what_is_not_symmetric(self, names: Container[str]) -> None:
+        """Refuse rules that are not their own mirror images where a part up to planes of symmetry is computed.
+
+        Parameters
+        ----------
+        names
+            Parameters, or names of methods, that the rules stand in which are looked at.
+        """
+        for name, rule in self.rules.items() if self.planes_of_symmetry else ():
+            parameter = RULES[name]
+            if parameter not in names and name not in names:
+                continue
+            for axis in self.planes_of_symmetry:
+                found = asymmetry(name, rule, self.checked_domain, self.default_until, axis, self.moved_centres)
+                if found:
+                    text = getattr(self, parameter)
+                    given = f"{type(self).__name__}.{name}" if text is None else f"{parameter} = {shown(text)}"
+                    told = f"the {WORDS[name]} is not symmetric in {'xyz'[axis]} = 0, up to which the flow is computed"
+                    raise ConfigError(self.symbols(f"{given}: {told}: {found}"))
+
+    @property
+    def planes_of_symmetry(self) -> tuple[int, ...]:
+        """Axes normal to the planes through 0 that end what is computed, beyond which the flow is its mirror image."""
+        return ()
 
     @property
     def space_dimensions(self) -> int:

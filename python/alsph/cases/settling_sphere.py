@@ -96,6 +96,11 @@ class SettlingSphere(Case):
         return 0.25
 
     @property
+    def planes_of_symmetry(self) -> tuple[int, ...]:
+        """Axes x and y."""
+        return (0, 1)
+
+    @property
     def centre(self) -> FloatArray:
         """Centre of the sphere at the start (3,) [D]."""
         return np.array([0.0, 0.0, self.height - END if self.sinks else END])
