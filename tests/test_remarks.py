@@ -181,6 +181,45 @@ def test_remarks_of_a_run(tmp_path):
     assert broken.remarks[0].startswith("diverged: at tU/D = 29.9") and "of 60" in broken.remarks[0]
 
 
+@pytest.mark.parametrize(
+    ("scheme", "remedy"),
+    [
+        (None, "more projection_sweeps or max_iterations lower it"),
+        ("isph", "more projection_sweeps lower it"),
+        ("explicit_isph", "more projection_sweeps lower it"),
+        ("wcsph", "a larger sound_speed lowers it"),
+        ("edac", "a larger sound_speed lowers it"),
+    ],
+)
+def test_what_makes_a_flow_more_free_of_divergence_is_of_its_scheme(tmp_path, scheme, remedy):
+    run = Run(write_run(tmp_path / "run"))
+    run.history["divergence_mean"][:] = 0.1
+    assert f"not divergence-free: mean |∇·u| = 0.1 U/D; {remedy}" in outcome(run, "60", scheme)
+    run.history["surface"] = np.ones_like(run.history["time"])
+    (told,) = [remark for remark in outcome(run, "60", scheme) if remark.startswith("not divergence-free")]
+    assert told.endswith(remedy.replace(" or max_iterations", "")) and "alone in the air" in told
+
+
+def test_what_makes_a_fluid_give_way_less_is_of_its_scheme():
+    (told,) = remarks.penalty(1.0, "wcsph")
+    assert "the speed of sound lets the fluid give way as at a Mach number of 1," in told
+    assert told.endswith("take a larger sound_speed")
+    assert remarks.penalty(1.0)[0].endswith("take a smaller courant, or a larger penalty_constant")
+    slow = Cylinder(scheme="edac", sound_speed=1.0).remarks()
+    assert any("larger sound_speed" in remark for remark in slow) and not any("penalty" in each for each in slow)
+
+
+def test_a_drag_of_rounding_is_not_unphysical(tmp_path):
+    def said(drag):
+        path = write_run(tmp_path / f"{drag}")
+        run = Run(path)
+        for name in run.history.keys() & {f"cylinder_{part}_force_x" for part in ("pressure", "viscous")}:
+            run.history[name][:] = drag
+        return [remark for remark in outcome(run, "60") if remark.startswith("unphysical")]
+
+    assert not said(-1e-10) and said(-1e-3)
+
+
 def test_fluid_that_comes_back_through_an_outlet_is_remarked_upon(tmp_path):
     """The outlet cuts the wake of a cylinder at Re = 40: it stays full, and the drag is that of a long channel."""
     kwargs = {"reynolds": 40, "resolution": 8, "height": 5.0, "upstream": 2.0, "perturbation": 0.0}

@@ -243,7 +243,7 @@ class Case(Discretised):
             *remarks.derived(type(self)),
             *remarks.prescribed(self._driven_by),
             *([f"no reference: {self.no_reference}"] if self.no_reference else []),
-            *remarks.penalty(self.expected_penalty_constant()),
+            *remarks.penalty(self.expected_penalty_constant(), self.scheme),
         ]
 
     def remarks_until(self, until: float) -> list[str]:
