@@ -260,10 +260,10 @@ def test_a_run_that_begins_with_one_whose_body_has_moved_is_told_so(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
-        ({"mass": 0}, "rigid: mass = 0: must be a number above 0"),
-        ({"mass": "x"}, "rigid: mass = 'x': must be a number above 0"),
+        ({"mass": 0}, "rigid: mass = 0: must be a number above zero"),
+        ({"mass": "x"}, "rigid: mass = 'x': must be a number above zero"),
         ({"inertia": (1, 2)}, "rigid: inertia = "),
-        ({"displaced": -1}, "rigid: displaced = -1: must be a number above 0"),
+        ({"displaced": -1}, "rigid: displaced = -1: must be a number above zero"),
         ({"force": (1,)}, "rigid: force = (1,): must be 2 finite numbers"),
         ({"free": (True,)}, "rigid: free = (True,): must be 2 directions and 1 axes, True or False each"),
         ({"free": (1, 1, 1)}, "rigid: free = (1, 1, 1): must be"),
@@ -271,12 +271,21 @@ def test_a_run_that_begins_with_one_whose_body_has_moved_is_told_so(tmp_path):
         ({"free": (False, False, False)}, "rigid: free = (False, False, False): a body that cannot move at all"),
         ({"stiffness": (0, -1)}, "rigid: stiffness = (0, -1): must not be negative"),
         ({"damping": (-0.5, 0)}, "rigid: damping = (-0.5, 0): must not be negative"),
-        ({"added_mass": -1.0}, "rigid: added_mass = -1.0: must be a number"),
+        ({"added_mass": -1.0}, "rigid: added_mass = -1.0: must not be negative"),
+        ({"added_inertia": "0"}, "rigid: added_inertia = '0': must be a number"),
+        ({"mass": "1"}, "rigid: mass = '1': must be a number above zero"),
+        ({"mass": True}, "rigid: mass = True: must be a number above zero"),
+        ({"mass": np.inf}, "rigid: mass = inf: must be a finite number above zero"),
     ],
 )
 def test_rigid_bodies_that_cannot_be_are_refused(wrong, told):
     with pytest.raises(ConfigError, match=re.escape(told)):
         SolidBody("a", (0, 0), rigid=Rigid(**({"mass": 1, "inertia": 1, "displaced": 1} | wrong)))
+
+
+def test_a_body_may_drag_nothing_along():
+    body = SolidBody("a", (0, 0), rigid=Rigid(1, 1, 1, added_mass=0, added_inertia=np.float64(0)))
+    assert body.rigid.settings(2)["added_mass"] == body.rigid.settings(2)["added_inertia"] == 0
 
 
 @pytest.mark.parametrize("ratio", [0.1, 0.5, 2.0, 8.0])

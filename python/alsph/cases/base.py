@@ -130,11 +130,6 @@ class Case(Discretised):
         return code.model_dump() if code else cls.name
 
     @property
-    def default_until(self) -> float:
-        """End time of a run that is given none [D/U]: by default twice the longest side of the domain over U."""
-        return 2.0 * max(self.checked_domain.size)
-
-    @property
     def thickness(self) -> float:
         """Extent of the body that drag and lift are those of, across the stream [D]."""
         return 1.0

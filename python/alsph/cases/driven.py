@@ -72,6 +72,11 @@ class Driven(Dimensional):
         self.refuse_what_is_not_symmetric(self._expressions)
         return self
 
+    @property
+    def default_until(self) -> float:
+        """End time of a run that is given none [D/U]: by default twice the longest side of the domain over U."""
+        return 2.0 * max(self.checked_domain.size)
+
     def refuse_what_is_not_symmetric(self, names: Container[str]) -> None:
         """Refuse rules that are not their own mirror images where a part up to planes of symmetry is computed.
 
