@@ -15,6 +15,7 @@ from alsph.cases import (
     Cylinder,
     Poiseuille,
     Sphere,
+    StillWater,
     TaylorGreen,
     remarks,
 )
@@ -198,6 +199,43 @@ def test_what_makes_a_flow_more_free_of_divergence_is_of_its_scheme(tmp_path, sc
     run.history["surface"] = np.ones_like(run.history["time"])
     (told,) = [remark for remark in outcome(run, "60", scheme) if remark.startswith("not divergence-free")]
     assert told.endswith(remedy.replace(" or max_iterations", "")) and "alone in the air" in told
+
+
+@pytest.mark.parametrize(
+    ("scheme", "idle"),
+    [
+        (None, ""),
+        ("isph", "max_iterations = 7, tolerance = 0.01, viscous_theta = 0.9, time_step_safety = 0.5"),
+        ("explicit_isph", "max_iterations = 7, tolerance = 0.01, viscous_theta = 0.9, time_step_safety = 0.5"),
+        (
+            "wcsph",
+            "max_iterations = 7, tolerance = 0.01, viscous_theta = 0.9, time_step_safety = 0.5, "
+            "projection_sweeps = 9, sweep_weights = equal, sweep_pressure = rough",
+        ),
+    ],
+)
+def test_what_has_no_effect_with_a_scheme_is_told_and_has_none(scheme, idle):
+    chosen = {"max_iterations": 7, "tolerance": 0.01, "viscous_theta": 0.9, "time_step_safety": 0.5}
+    chosen |= {"projection_sweeps": 9, "sweep_weights": "equal", "sweep_pressure": "rough"}
+    plain = Cavity(resolution=10, scheme=scheme)
+    case = plain.replace(**chosen)
+    told = [remark for remark in case.remarks() if remark.startswith("no effect")]
+    assert told == ([f"no effect: {idle}; nothing depends on them with {scheme}"] if idle else [])
+    assert not any("no effect" in remark for remark in plain.remarks())
+    acting = plain.replace(**{name: value for name, value in chosen.items() if name not in idle})
+    states = []
+    for each in (acting, case):
+        simulation = each.simulation(threads=1)
+        simulation.advance(3)
+        states.append(simulation.state()["velocity"])
+    assert not idle or np.array_equal(*states)
+
+
+def test_what_has_no_effect_in_a_case_is_told():
+    told = StillWater(resolution=10, wall_pressure="adami").remarks()
+    assert "no effect: wall_pressure = adami; nothing depends on it in still_water" in told
+    for scheme in ("isph", "explicit_isph", "wcsph", "edac"):
+        assert not any("no effect" in remark for remark in StillWater(resolution=10, scheme=scheme).remarks())
 
 
 def test_what_makes_a_fluid_give_way_less_is_of_its_scheme():

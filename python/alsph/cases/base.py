@@ -235,6 +235,10 @@ class Case(Discretised):
             *(remarks.validated(self.reynolds, self.resolution, self.cell_reynolds, known) if known else []),
             *remarks.kernel(self.kernel, self.smoothing_ratio),
             *remarks.scheme(self.scheme, self.wall_pressure),
+            *remarks.without_effect({name: getattr(self, name) for name in self.without_effect}, f"with {self.scheme}"),
+            *remarks.without_effect(
+                {name: getattr(self, name) for name in self.idle if self._is_chosen(name)}, f"in {self.name}"
+            ),
             *remarks.derived(type(self)),
             *remarks.prescribed(self._driven_by),
             *([f"no reference: {self.no_reference}"] if self.no_reference else []),

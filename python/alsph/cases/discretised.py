@@ -11,6 +11,7 @@ from pydantic import Field
 
 from alsph.arrays import FloatArray
 from alsph.cases.driven import Driven
+from alsph.cases.method import DIFFUSION, SCHEMES, goes_with
 from alsph.engine.core import bytes_per_particle, time_step_limits
 from alsph.errors import ConfigError
 from alsph.geometry.domain import SolidBody
@@ -18,6 +19,13 @@ from alsph.memory import check
 
 VELOCITY_LIMIT = 50.0
 """Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
+
+
+ACTING = {
+    **dict.fromkeys(("max_iterations", "tolerance", "viscous_theta", "time_step_safety"), ("alsph",)),
+    **dict.fromkeys(("projection_sweeps", "sweep_weights", "sweep_pressure"), set(SCHEMES) - {*DIFFUSION}),
+}
+"""The schemes in which a parameter that all take has an effect, of those that have none in some."""
 
 
 class Discretised(Driven):
@@ -53,6 +61,17 @@ class Discretised(Driven):
                 f"use {' or '.join(near)}"
             )
         return round(cells)
+
+    @property
+    def without_effect(self) -> list[str]:
+        """Parameters that are not as they are by default, and that nothing depends on with the scheme."""
+        scheme = self.scheme or "alsph"
+        return [name for name, schemes in ACTING.items() if scheme not in schemes and self._is_chosen(name)]
+
+    def _is_chosen(self, name: str) -> bool:
+        """Whether a parameter has another value than by default with the scheme."""
+        default = goes_with(self.scheme).get(name, type(self).model_fields[name].default)
+        return getattr(self, name) not in (None, default)
 
     def settings(self) -> dict[str, Any]:
         """Return the engine's settings (see docs/architecture.md)."""

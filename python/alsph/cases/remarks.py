@@ -158,6 +158,14 @@ def scheme(name: str | None, wall_pressure: str) -> list[str]:
     return [compared, f"{grows}; use wall_pressure = adami"]
 
 
+def without_effect(values: dict[str, object], where: str) -> list[str]:
+    """Remark on parameters, by name, that are given and that nothing depends on, in words where."""
+    if not values:
+        return []
+    told = ", ".join(f"{name} = {value}" for name, value in values.items())
+    return [f"no effect: {told}; nothing depends on {'it' if len(values) == 1 else 'them'} {where}"]
+
+
 def penalty(constant: float, scheme: str | None = None) -> list[str]:
     """Remark on a constant (c/u_max)² of the penalty or the speed of sound too small for a fluid that hardly gives way.
 
