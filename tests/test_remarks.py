@@ -238,6 +238,46 @@ def test_what_has_no_effect_in_a_case_is_told():
         assert not any("no effect" in remark for remark in StillWater(resolution=10, scheme=scheme).remarks())
 
 
+FAST = {"resolution": 8, "length": 8.0, "height": 6.0, "upstream": 3.0}
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"body_motion": "0, 0.05*sin(2*pi*t/0.5)"}, "body_motion swings while it travels 1.7 D; with less than 5 D"),
+        ({"body_motion": "0.5*t, 0.05*sin(2*pi*t), t", "scheme": "wcsph"}, "10 D; with less than 16 D forces err"),
+        ({"driving_force": "0, 3 + sin(2*pi*t)"}, "driving_force swings while it travels 3.4 D; with less than 32 D"),
+    ],
+)
+def test_what_swings_faster_than_the_pressure_follows_is_remarked_upon(options, told):
+    """Added masses of 0.68 to 1.11 in place of 0.88 to 1.02, and of forces several times the right one."""
+    (remark,) = [each for each in Cylinder(**FAST, **options).remarks() if each.startswith("slow pressure")]
+    assert told in remark and remark.endswith(", or isph")
+    assert not any("slow pressure" in each for each in Cylinder(**FAST, **options | {"scheme": "isph"}).remarks())
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"body_motion": "0, 0.3*sin(2*pi*t/5)"},
+        {"body_motion": "-0.5*t, 0, 2*t"},
+        {"body_motion": "0, spline(t, 0,0, 1,0.1, 2,0.3, 3,0.4)"},
+        {"driving_force": "0.1, 0"},
+        {"driving_force": "0, sin(2*pi*t/20)"},
+    ],
+)
+def test_what_swings_slowly_or_not_at_all_needs_no_remark(options):
+    assert not any("slow pressure" in each for each in Cylinder(**FAST, **options).remarks())
+
+
+@pytest.mark.parametrize("period", [0.3, 1.0, 4.0])
+def test_a_period_is_that_of_the_wave(period):
+    wave = f"sin(2*pi*t/{period})"
+    case = Cylinder(**FAST, body_motion=f"0.2*t + {wave}, t**2*0", driving_force=f"1, 0.5*{wave}")
+    assert case.swing_period("motion") == pytest.approx(period, rel=0.05)
+    assert case.swing_period("forcing") == pytest.approx(period, rel=0.05)
+
+
 def test_what_makes_a_fluid_give_way_less_is_of_its_scheme():
     (told,) = remarks.penalty(1.0, "wcsph")
     assert "the speed of sound lets the fluid give way as at a Mach number of 1," in told

@@ -242,6 +242,7 @@ class Case(Discretised):
             *remarks.derived(type(self)),
             *remarks.prescribed(self._driven_by),
             *([f"no reference: {self.no_reference}"] if self.no_reference else []),
+            *self.slow_pressure,
             *remarks.penalty(self.expected_penalty_constant(), self.scheme),
         ]
 

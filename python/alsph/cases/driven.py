@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 from abc import abstractmethod
 from collections.abc import Container
 from functools import cached_property
@@ -28,6 +29,12 @@ RULES = {
     "motion": "body_motion",
 }
 """What a case may prescribe by place and time: a method in Python, and the parameter that holds an expression."""
+
+SWINGS, SHORT = 200, 1e-3
+"""Number of times at which it is asked how a rule swings, and the step by which its rate is told [D/U]."""
+
+LEAST_RATE = 1e-6
+"""Rate below which nothing swings [U²/D, U³/D²]."""
 
 
 class Driven(Dimensional):
@@ -233,6 +240,22 @@ class Driven(Dimensional):
             vectors (b, 6) in 3-D [rad].
         """
         return self._given("body_motion", position, time)
+
+    def swing_period(self, name: str) -> float:
+        """Return the mean period of a ``motion`` or ``forcing`` that swings [D/U]; infinite if it does not.
+
+        It is 2π times the rms of what it swings by, velocity or force, over that of its rate, where the first body is.
+        """
+        centres = self.moved_centres if name == "motion" else np.array([self.checked_bodies[0].center], float)
+        times = np.linspace(0, 1, SWINGS) * self.default_until + 2 * SHORT
+        steps = (-SHORT, 0.0, SHORT)
+        found = [[asked(name, self.rules[name], centres, time + step) for step in steps] for time in times]
+        before, now, after = np.moveaxis(np.array(found)[:, :, 0, : self.space_dimensions], 1, 0)
+        swing, rate = now, (after - before) / (2 * SHORT)
+        if name == "motion":
+            swing, rate = rate, (after - 2 * now + before) / SHORT**2
+        size, change = (float(np.sqrt((each**2).sum(axis=1).mean())) for each in (swing - swing.mean(axis=0), rate))
+        return 2 * math.pi * size / change if change > LEAST_RATE else math.inf
 
     def _given(self, name: str, position: FloatArray, time: float) -> FloatArray | None:
         expression = self._expressions.get(name)
