@@ -3,7 +3,7 @@
 import alsph
 import numpy as np
 import pytest
-from alsph.cases import Cavity, Couette, TaylorGreen
+from alsph.cases import Cavity, Couette, Cylinder, TaylorGreen
 from alsph.folder.run_folder import RunFolder
 from alsph.results.outcome import unsolved
 
@@ -63,6 +63,21 @@ def test_steps_whose_pressure_is_not_solved_are_told(tmp_path):
     assert not capped.history["converged"].any()
     without_new_columns(capped.path)  # where `converged` said something else
     assert said(alsph.Run(capped.path)) == []
+
+
+def test_a_solve_that_ends_by_a_change_says_what_it_leaves(tmp_path):
+    def said(**chosen):
+        case = Cylinder(resolution=8, length=5, height=4, upstream=2, **chosen)
+        run = case.run(tmp_path / "_".join(map(str, chosen.values())), until=0.4, threads=1, progress=False)
+        inside = (run.history["time"] >= run.window.start) & (run.history["time"] <= run.window.end)
+        return [told for told in run.remarks if "ended by the change" in told], run.history["residual"][inside].mean()
+
+    (remark,), mean = said(scheme="sisph")
+    assert mean > 0.1 and "pressure not solved: Jacobi's iteration ended by the change of the pressure; " in remark
+    assert f"the residual is {mean:.2g} in the mean; take a smaller solver_tolerance" in remark
+    assert said(scheme="isph")[0] == said(scheme="shadloo")[0] == []
+    assert said(scheme="isph", solver="jacobi", solver_tolerance=0.0, solver_iterations=3)[0] == []
+    assert said(scheme="sisph", solver="bicgstab", solver_tolerance=0.3)[0] == []
 
 
 def test_solves_that_came_no_further_and_steps_of_an_older_alsph(tmp_path):

@@ -1,6 +1,7 @@
 """That references are shown where they hold alone, and numbers that develop say so."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -120,6 +121,44 @@ def test_a_floating_box_says_what_it_takes():
     assert not about(box.replace(resolution=40, density_ratio=0.25, lift=-0.05), "coarse")
     square = FloatingBox(resolution=20, box_length=0.4, box_height=0.4)  # upright below 0.21 and above 0.79 alone
     assert about(square, "unstable") and not about(square.replace(density_ratio=0.125), "unstable")
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (
+            {"density_ratio": 0.99},
+            "density_ratio = 0.99: to whole spacings, 1/20, its draught is 0.4 of a box_height of",
+        ),
+        ({"density_ratio": 0.001}, "density_ratio = 0.001: to whole spacings, 1/20, its draught is 0 of"),
+        ({"box_height": 0.02}, "box_height = 0.02: to whole particle spacings it is none; use a finer resolution"),
+        ({"box_length": 0.02}, "box_length = 0.02: to whole particle spacings it is none; use a finer resolution"),
+        ({"lift": 0.3}, "lift = 0.3: the box would not be in the water"),
+        ({"tank_height": 1.2, "box_height": 0.8, "lift": 0.3}, "tank_height = 1.2: the box, up to 1.7, would reach"),
+    ],
+)
+def test_a_box_that_does_not_float_in_its_tank_says_what_is_to_blame(options, told):
+    with pytest.raises(ConfigError, match=told):
+        FloatingBox(resolution=20, **options)
+
+
+def test_the_weight_of_a_box_is_by_all_that_pulls_it_down(tmp_path):
+    """Twice as much by a force beside gravity: the water carries that."""
+    case = FloatingBox(resolution=12, driving_force="0, -1", box_length=1.0)
+    run = case.run(tmp_path / "run", until=2.6, progress=False)
+    measures = {measure.name: measure.value for measure in run.measures}
+    assert measures["mean force of the water over the weight"] == pytest.approx(1, abs=0.05)
+
+
+def test_a_tank_that_sways_at_its_own_frequency_has_a_level_that_grows():
+    case = Sloshing(length=3, amplitude=1e-4, phase=30.0, frequency=0.9041914868500254)
+    time = np.linspace(0, 200, 401)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        level = case.linear_level(time, 0.1)
+    beside = case.replace(frequency=case.frequency * (1 + 1e-6)).linear_level(time, 0.1)
+    assert level == pytest.approx(beside, abs=1e-3 * np.abs(level).max())
+    assert np.abs(level[time > 150]).max() > 3 * np.abs(level[time < 50]).max()
 
 
 def test_linear_theory_is_of_small_waves():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapely
 from alsph import cases
+from alsph.analysis.averages import Estimate
 from alsph.cases import (
     Body,
     ConcentricRelease,
@@ -24,6 +25,7 @@ from alsph.errors import ConfigError, SolverError
 from alsph.geometry.domain import SolidBody
 from alsph.geometry.particles import Kind
 from alsph.geometry.rigid import Rigid
+from alsph.results.dimensional import dimensional
 from alsph.results.ledger import _wall_power as ledger_power
 from alsph.run_settings import RunSettings
 from alsph.running.outputs import SurfacePressure, remarks_of
@@ -258,10 +260,10 @@ def test_a_run_that_begins_with_one_whose_body_has_moved_is_told_so(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
-        ({"mass": 0}, "rigid: mass = 0: must be a number above 0"),
-        ({"mass": "x"}, "rigid: mass = 'x': must be a number above 0"),
+        ({"mass": 0}, "rigid: mass = 0: must be a number above zero"),
+        ({"mass": "x"}, "rigid: mass = 'x': must be a number above zero"),
         ({"inertia": (1, 2)}, "rigid: inertia = "),
-        ({"displaced": -1}, "rigid: displaced = -1: must be a number above 0"),
+        ({"displaced": -1}, "rigid: displaced = -1: must be a number above zero"),
         ({"force": (1,)}, "rigid: force = (1,): must be 2 finite numbers"),
         ({"free": (True,)}, "rigid: free = (True,): must be 2 directions and 1 axes, True or False each"),
         ({"free": (1, 1, 1)}, "rigid: free = (1, 1, 1): must be"),
@@ -269,12 +271,21 @@ def test_a_run_that_begins_with_one_whose_body_has_moved_is_told_so(tmp_path):
         ({"free": (False, False, False)}, "rigid: free = (False, False, False): a body that cannot move at all"),
         ({"stiffness": (0, -1)}, "rigid: stiffness = (0, -1): must not be negative"),
         ({"damping": (-0.5, 0)}, "rigid: damping = (-0.5, 0): must not be negative"),
-        ({"added_mass": -1.0}, "rigid: added_mass = -1.0: must be a number"),
+        ({"added_mass": -1.0}, "rigid: added_mass = -1.0: must not be negative"),
+        ({"added_inertia": "0"}, "rigid: added_inertia = '0': must be a number"),
+        ({"mass": "1"}, "rigid: mass = '1': must be a number above zero"),
+        ({"mass": True}, "rigid: mass = True: must be a number above zero"),
+        ({"mass": np.inf}, "rigid: mass = inf: must be a finite number above zero"),
     ],
 )
 def test_rigid_bodies_that_cannot_be_are_refused(wrong, told):
     with pytest.raises(ConfigError, match=re.escape(told)):
         SolidBody("a", (0, 0), rigid=Rigid(**({"mass": 1, "inertia": 1, "displaced": 1} | wrong)))
+
+
+def test_a_body_may_drag_nothing_along():
+    body = SolidBody("a", (0, 0), rigid=Rigid(1, 1, 1, added_mass=0, added_inertia=np.float64(0)))
+    assert body.rigid.settings(2)["added_mass"] == body.rigid.settings(2)["added_inertia"] == 0
 
 
 @pytest.mark.parametrize("ratio", [0.1, 0.5, 2.0, 8.0])
@@ -420,6 +431,19 @@ def test_a_quarter_of_a_sphere_settles_straight(tmp_path):
     assert not history["sphere_displacement_x"].any() and not history["sphere_angle_x"].any()
     assert -0.2 < history["sphere_velocity_z"][-1] < -0.1
     assert (np.diff(history["sphere_velocity_z"]) <= 0).all()
+
+
+def test_a_settling_sphere_has_no_coefficients_of_the_forces_from_its_sides(tmp_path):
+    """Its force is along z, and its C_D is formed with the settling velocity: in SI it is no force."""
+    case = SettlingSphere(resolution=8, height=6, width=3)
+    run = case.run(tmp_path / "run", until=0.1, progress=False)
+    assert run.body is None and np.isnan(run.drag.mean) and np.isnan(run.lift.mean)
+    assert not {"drag_coefficient", "lift_coefficient"} & run.history.keys()
+    force = sum(run.history[f"sphere_{part}_force_z"][-1] for part in ("pressure", "viscous"))
+    assert run.coefficient("z", body="sphere")[-1] == pytest.approx(force / (0.5 * np.pi / 16))
+    units = alsph.Units(length=2.0, velocity=3.0, density=5.0, kinematic_viscosity=1.0)
+    assert "C_D at the settling velocity" in case.later_names
+    assert not dimensional({name: Estimate(1.2) for name in case.later_names}, units, 3, case.reference_area, 1.0)
 
 
 def test_the_examples_of_the_page_are_run():

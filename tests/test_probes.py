@@ -127,8 +127,27 @@ def test_inside_a_body_there_is_nothing(tmp_path):
     run = body.run(tmp_path / "run", until=0.05, probes=[inside, outside], progress=False)
     assert np.isnan(run.probes.velocity[:, 0]).all() and np.isfinite(run.probes.velocity[:, 1]).all()
     assert np.isnan(run.sample(inside)["pressure"]).all() and np.isfinite(run.sample(outside)["pressure"]).all()
-    remark = "probes: 1 of the points lies in a body, as (2, 0): what they record is no flow; move them"
+    remark = "probes: 1 of the points lies in a body, as (2, 0): nothing is recorded there; move them"
     assert f"remark: {remark}" in (run.path / "run.log").read_text()
+
+
+def test_what_a_body_passes_over_has_nothing_in_the_meantime(tmp_path):
+    """A plate that turns by a right angle, and goes up."""
+    plate = Body(shape=[[-0.5, -0.2], [0.5, -0.2], [0.5, 0.2], [-0.5, 0.2]], resolution=10, length=5, height=4)
+    case = plate.replace(upstream=2, body_motion="0, 0.8*t, pi/2*t")
+    where = [[2.4, 0.1], [2.0, 0.9], [2.0, 1.2], [2.4, 0.8], [3.5, 1.0]]
+    run = case.run(tmp_path / "run", until=1.0, probes=where, probe_interval=0.1, progress=False)
+    known = np.isfinite(run.probes.pressure)
+    assert (known == np.isfinite(run.probes.velocity).all(axis=2)).all()
+    assert known[0].tolist() == [False, True, True, True, True]
+    assert known[-1].tolist() == [True, False, False, True, True]
+
+
+def test_what_lies_on_the_surface_of_a_body_is_recorded(tmp_path):
+    body = Body(resolution=10, length=5, height=4, upstream=2)
+    edge = [[1.5, 0.0], [2.0, 0.5], [2.5, 0.1], [2.3, -0.5]]
+    run = body.run(tmp_path / "run", until=0.2, probes=edge, progress=False)
+    assert np.isfinite(run.probes.pressure).all() and "probes" not in "".join(run.remarks)
 
 
 @given(st.floats(-1, 1), st.floats(-1, 1))

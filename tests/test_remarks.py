@@ -15,6 +15,7 @@ from alsph.cases import (
     Cylinder,
     Poiseuille,
     Sphere,
+    StillWater,
     TaylorGreen,
     remarks,
 )
@@ -179,6 +180,122 @@ def test_remarks_of_a_run(tmp_path):
     assert remarks.keywords(broken.remarks).startswith("diverged, retried")
     assert "unphysical" in remarks.keywords(broken.remarks)
     assert broken.remarks[0].startswith("diverged: at tU/D = 29.9") and "of 60" in broken.remarks[0]
+
+
+@pytest.mark.parametrize(
+    ("scheme", "remedy"),
+    [
+        (None, "more projection_sweeps or max_iterations lower it"),
+        ("isph", "more projection_sweeps lower it"),
+        ("explicit_isph", "more projection_sweeps lower it"),
+        ("wcsph", "a larger sound_speed lowers it"),
+        ("edac", "a larger sound_speed lowers it"),
+    ],
+)
+def test_what_makes_a_flow_more_free_of_divergence_is_of_its_scheme(tmp_path, scheme, remedy):
+    run = Run(write_run(tmp_path / "run"))
+    run.history["divergence_mean"][:] = 0.1
+    assert f"not divergence-free: mean |∇·u| = 0.1 U/D; {remedy}" in outcome(run, "60", scheme)
+    run.history["surface"] = np.ones_like(run.history["time"])
+    (told,) = [remark for remark in outcome(run, "60", scheme) if remark.startswith("not divergence-free")]
+    assert told.endswith(remedy.replace(" or max_iterations", "")) and "alone in the air" in told
+
+
+@pytest.mark.parametrize(
+    ("scheme", "idle"),
+    [
+        (None, ""),
+        ("isph", "max_iterations = 7, tolerance = 0.01, viscous_theta = 0.9, time_step_safety = 0.5"),
+        ("explicit_isph", "max_iterations = 7, tolerance = 0.01, viscous_theta = 0.9, time_step_safety = 0.5"),
+        (
+            "wcsph",
+            "max_iterations = 7, tolerance = 0.01, viscous_theta = 0.9, time_step_safety = 0.5, "
+            "projection_sweeps = 9, sweep_weights = equal, sweep_pressure = rough",
+        ),
+    ],
+)
+def test_what_has_no_effect_with_a_scheme_is_told_and_has_none(scheme, idle):
+    chosen = {"max_iterations": 7, "tolerance": 0.01, "viscous_theta": 0.9, "time_step_safety": 0.5}
+    chosen |= {"projection_sweeps": 9, "sweep_weights": "equal", "sweep_pressure": "rough"}
+    plain = Cavity(resolution=10, scheme=scheme)
+    case = plain.replace(**chosen)
+    told = [remark for remark in case.remarks() if remark.startswith("no effect")]
+    assert told == ([f"no effect: {idle}; nothing depends on them with {scheme}"] if idle else [])
+    assert not any("no effect" in remark for remark in plain.remarks())
+    acting = plain.replace(**{name: value for name, value in chosen.items() if name not in idle})
+    states = []
+    for each in (acting, case):
+        simulation = each.simulation(threads=1)
+        simulation.advance(3)
+        states.append(simulation.state()["velocity"])
+    assert not idle or np.array_equal(*states)
+
+
+def test_what_has_no_effect_in_a_case_is_told():
+    told = StillWater(resolution=10, wall_pressure="adami").remarks()
+    assert "no effect: wall_pressure = adami; nothing depends on it in still_water" in told
+    for scheme in ("isph", "explicit_isph", "wcsph", "edac"):
+        assert not any("no effect" in remark for remark in StillWater(resolution=10, scheme=scheme).remarks())
+
+
+FAST = {"resolution": 8, "length": 8.0, "height": 6.0, "upstream": 3.0}
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"body_motion": "0, 0.05*sin(2*pi*t/0.5)"}, "body_motion swings while it travels 1.7 D; with less than 5 D"),
+        ({"body_motion": "0.5*t, 0.05*sin(2*pi*t), t", "scheme": "wcsph"}, "10 D; with less than 16 D forces err"),
+        ({"driving_force": "0, 3 + sin(2*pi*t)"}, "driving_force swings while it travels 3.4 D; with less than 32 D"),
+    ],
+)
+def test_what_swings_faster_than_the_pressure_follows_is_remarked_upon(options, told):
+    """Added masses of 0.68 to 1.11 in place of 0.88 to 1.02, and of forces several times the right one."""
+    (remark,) = [each for each in Cylinder(**FAST, **options).remarks() if each.startswith("slow pressure")]
+    assert told in remark and remark.endswith(", or isph")
+    assert not any("slow pressure" in each for each in Cylinder(**FAST, **options | {"scheme": "isph"}).remarks())
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"body_motion": "0, 0.3*sin(2*pi*t/5)"},
+        {"body_motion": "-0.5*t, 0, 2*t"},
+        {"body_motion": "0, spline(t, 0,0, 1,0.1, 2,0.3, 3,0.4)"},
+        {"driving_force": "0.1, 0"},
+        {"driving_force": "0, sin(2*pi*t/20)"},
+    ],
+)
+def test_what_swings_slowly_or_not_at_all_needs_no_remark(options):
+    assert not any("slow pressure" in each for each in Cylinder(**FAST, **options).remarks())
+
+
+@pytest.mark.parametrize("period", [0.3, 1.0, 4.0])
+def test_a_period_is_that_of_the_wave(period):
+    wave = f"sin(2*pi*t/{period})"
+    case = Cylinder(**FAST, body_motion=f"0.2*t + {wave}, t**2*0", driving_force=f"1, 0.5*{wave}")
+    assert case.swing_period("motion") == pytest.approx(period, rel=0.05)
+    assert case.swing_period("forcing") == pytest.approx(period, rel=0.05)
+
+
+def test_what_makes_a_fluid_give_way_less_is_of_its_scheme():
+    (told,) = remarks.penalty(1.0, "wcsph")
+    assert "the speed of sound lets the fluid give way as at a Mach number of 1," in told
+    assert told.endswith("take a larger sound_speed")
+    assert remarks.penalty(1.0)[0].endswith("take a smaller courant, or a larger penalty_constant")
+    slow = Cylinder(scheme="edac", sound_speed=1.0).remarks()
+    assert any("larger sound_speed" in remark for remark in slow) and not any("penalty" in each for each in slow)
+
+
+def test_a_drag_of_rounding_is_not_unphysical(tmp_path):
+    def said(drag):
+        path = write_run(tmp_path / f"{drag}")
+        run = Run(path)
+        for name in run.history.keys() & {f"cylinder_{part}_force_x" for part in ("pressure", "viscous")}:
+            run.history[name][:] = drag
+        return [remark for remark in outcome(run, "60") if remark.startswith("unphysical")]
+
+    assert not said(-1e-10) and said(-1e-3)
 
 
 def test_fluid_that_comes_back_through_an_outlet_is_remarked_upon(tmp_path):

@@ -441,6 +441,7 @@ def test_gauges_beside_the_topmost_row_of_a_wave(tmp_path):
         (cases.DamBreak(), "6", r"\[6.0\] lies outside of the domain, \[0.0\] to \[5.366\] \[H\]"),
         (cases.DamBreak(dimensions=3), "1", "must be two finite numbers"),
         (cases.DamBreak(), "0:1", "run.gauges: '0:1' is no line"),
+        (cases.DamBreak(), "0; 0:5.366:60", "run.gauges = '0; 0:5.366:60': 0 is there twice"),
     ],
 )
 def test_gauges_that_cannot_be_are_refused(case, gauges, message):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 from alsph import Run
-from alsph.cases import Body3D, Pipe, Spatial, Sphere
+from alsph.cases import Body3D, DamBreakObstacle, DamBreakStructure, Pipe, SettlingSphere, Spatial, Sphere
 from alsph.errors import ConfigError
 from alsph.geometry.lattice import lattice, symmetric_centres
 from alsph.geometry.mesh import Mesh
@@ -217,6 +217,46 @@ def test_a_quarter_has_a_drag_alone_and_is_refused_of_what_is_no_image_of_itself
     assert run.measures and all("drag" in measure.name for measure in run.measures)
     with pytest.raises(ConfigError, match="quarter = true: the body is not its own mirror image in y and in z"):
         Body3D(shape=wedge, angle_of_attack=10.0, quarter=True)
+
+
+QUARTER = {"quarter": True, **SMALL}
+
+
+@pytest.mark.parametrize(
+    ("model", "options", "told"),
+    [
+        (Sphere, QUARTER | {"surface_velocity": "0,-z,y"}, "velocity of surfaces is not symmetric in y = 0"),
+        (Sphere, QUARTER | {"body_motion": "0,0,0,sin(t),0,0"}, "motion of bodies is not symmetric in y = 0"),
+        (Sphere, QUARTER | {"body_motion": "0,0,t"}, "motion of bodies is not symmetric in z = 0"),
+        (Sphere, QUARTER | {"inlet_velocity": "1,0.3,0"}, r"inflow is not symmetric in y = 0.*gives \(1, 0.3, 0\)"),
+        (Sphere, QUARTER | {"driving_force": "y,0,0"}, "body force is not symmetric in y = 0"),
+        (Sphere, QUARTER | {"perturbation": 0.5}, "quarter = true: not with perturbation = 0.5"),
+        (SettlingSphere, {"driving_force": "1,0,0"}, "body force is not symmetric in x = 0"),
+        (DamBreakObstacle, {"driving_force": "0,0.5*(t > 1),0"}, "body force is not symmetric in y = 0"),
+        (DamBreakStructure, {"body_motion": "0,0,0,0,0,t"}, "motion of bodies is not symmetric in y = 0"),
+    ],
+)
+def test_a_part_up_to_planes_of_symmetry_refuses_what_breaks_it(model, options, told):
+    with pytest.raises(ConfigError, match=told):
+        model(**options)
+
+
+def test_a_part_up_to_planes_of_symmetry_takes_what_has_it():
+    Sphere(**QUARTER, inlet_velocity="1 + 0.1*y**2*sin(t), -0.1*y, 0", body_motion="3 + 0.1*t, 2, 1")
+    Sphere(**QUARTER, driving_force="sin(t), -y, z", surface_velocity="1, y, z*abs(y)")
+    SettlingSphere(driving_force="x*z, y, z*t")
+    DamBreakStructure(body_motion="0.1*t, 0, 0, 0, 0.1*t, 0")
+
+
+def test_a_method_that_breaks_the_symmetry_is_refused_before_a_run():
+    class Blown(Sphere):
+        """Inflow from the side."""
+
+        def inflow(self, position, time):
+            return [1.0, 0.1 * time, 0.0]
+
+    with pytest.raises(ConfigError, match=r"Blown.inflow: the inflow is not symmetric in y = 0"):
+        Blown(**QUARTER).build()
 
 
 def test_a_quarter_of_a_sphere_has_the_drag_of_the_whole(tmp_path):

@@ -114,12 +114,16 @@ class Config:
         Raises
         ------
         ConfigError
-            If the case has no water that lies in a tank, or they are no places of the domain.
+            If the case has no water that lies in a tank, they are no places of the domain, or one is there twice.
         """
         if self.run.gauges and not self.case.has_depth:
             told = "no gauges: it has no water that lies on a floor at rest"
             raise ConfigError(f"run.gauges = {shown(self.run.gauges)}: {self.case.name} takes {told}; leave them out")
-        return self._within("gauges", self.case.space_dimensions - 1)
+        found = self._within("gauges", self.case.space_dimensions - 1)
+        places = [", ".join(f"{x:g}" for x in place) for place in found]
+        if twice := next((place for place in places if places.count(place) > 1), ""):
+            raise ConfigError(f"run.gauges = {shown(self.run.gauges)}: {twice} is there twice, to six digits")
+        return found
 
     def _within(self, setting: str, dimensions: int) -> FloatArray:
         """Return points (m, d') of a setting, by their first coordinates, if they are in the domain."""

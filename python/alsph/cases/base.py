@@ -130,11 +130,6 @@ class Case(Discretised):
         return code.model_dump() if code else cls.name
 
     @property
-    def default_until(self) -> float:
-        """End time of a run that is given none [D/U]: by default twice the longest side of the domain over U."""
-        return 2.0 * max(self.checked_domain.size)
-
-    @property
     def thickness(self) -> float:
         """Extent of the body that drag and lift are those of, across the stream [D]."""
         return 1.0
@@ -240,10 +235,15 @@ class Case(Discretised):
             *(remarks.validated(self.reynolds, self.resolution, self.cell_reynolds, known) if known else []),
             *remarks.kernel(self.kernel, self.smoothing_ratio),
             *remarks.scheme(self.scheme, self.wall_pressure),
+            *remarks.without_effect({name: getattr(self, name) for name in self.without_effect}, f"with {self.scheme}"),
+            *remarks.without_effect(
+                {name: getattr(self, name) for name in self.idle if self._is_chosen(name)}, f"in {self.name}"
+            ),
             *remarks.derived(type(self)),
             *remarks.prescribed(self._driven_by),
             *([f"no reference: {self.no_reference}"] if self.no_reference else []),
-            *remarks.penalty(self.expected_penalty_constant()),
+            *self.slow_pressure,
+            *remarks.penalty(self.expected_penalty_constant(), self.scheme),
         ]
 
     def remarks_until(self, until: float) -> list[str]:
@@ -285,8 +285,10 @@ class Case(Discretised):
         Raises
         ------
         ConfigError
-            If the particles would not fit into the memory that is free, or surfaces would slide through themselves.
+            If the particles would not fit into the memory that is free, surfaces would slide through themselves, or
+            what drives the flow has not the symmetry of what is computed.
         """
+        self.refuse_what_is_not_symmetric(self.rules)
         self.check_memory(threads)
         state = self.particles()
         self._warn_of_unused_velocities(state)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,7 +11,8 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from alsph.arrays import FloatArray
-from alsph.cases.driven import Driven
+from alsph.cases.driven import RULES, Driven
+from alsph.cases.method import DIFFUSION, SCHEMES, goes_with
 from alsph.engine.core import bytes_per_particle, time_step_limits
 from alsph.errors import ConfigError
 from alsph.geometry.domain import SolidBody
@@ -18,6 +20,17 @@ from alsph.memory import check
 
 VELOCITY_LIMIT = 50.0
 """Speed [U] that no flow here comes near: a particle beyond it tells of a breakdown."""
+
+
+LONG = 5.0
+"""Way [D] that pressure travels in a period of a body that oscillates: with less its force is not that of an
+incompressible fluid. Where waves go to and fro, it is that over the domain (docs/reliability.md)."""
+
+ACTING = {
+    **dict.fromkeys(("max_iterations", "tolerance", "viscous_theta", "time_step_safety"), ("alsph",)),
+    **dict.fromkeys(("projection_sweeps", "sweep_weights", "sweep_pressure"), set(SCHEMES) - {*DIFFUSION}),
+}
+"""The schemes in which a parameter that all take has an effect, of those that have none in some."""
 
 
 class Discretised(Driven):
@@ -53,6 +66,17 @@ class Discretised(Driven):
                 f"use {' or '.join(near)}"
             )
         return round(cells)
+
+    @property
+    def without_effect(self) -> list[str]:
+        """Parameters that are not as they are by default, and that nothing depends on with the scheme."""
+        scheme = self.scheme or "alsph"
+        return [name for name, schemes in ACTING.items() if scheme not in schemes and self._is_chosen(name)]
+
+    def _is_chosen(self, name: str) -> bool:
+        """Whether a parameter has another value than by default with the scheme."""
+        default = goes_with(self.scheme).get(name, type(self).model_fields[name].default)
+        return getattr(self, name) not in (None, default)
 
     def settings(self) -> dict[str, Any]:
         """Return the engine's settings (see docs/architecture.md)."""
@@ -127,6 +151,25 @@ class Discretised(Driven):
             return self.penalty_constant
         largest = time_step_limits(self.settings(), self.expected_velocity)["lambda_max"]
         return (self.expected_time_step() * self.expected_velocity) ** -2 / largest
+
+    @cached_property
+    def slow_pressure(self) -> list[str]:
+        """Remarks on expressions by which a body swings, or a force on it, faster than the pressure can follow."""
+        if not self.coefficient_bodies or self.is_projection or self.checked_domain.meets_air:
+            return []
+        speed, side = self.expected_velocity * self.expected_penalty_constant() ** 0.5, max(self.checked_domain.size)
+        found = []
+        for name in ("motion", "forcing"):
+            if RULES[name] not in self._driven_by or not self.checked_bodies:
+                continue
+            rings = self.is_weakly_compressible
+            least = LONG if name == "motion" and not rings else (2 if name == "motion" else 4) * side
+            if (way := speed * self.swing_period(name)) < least:
+                told = f"{RULES[name]} swings while it travels {way:.2g} D; with less than {least:.3g} D forces err"
+                known = "by 10 % and more" if name == "motion" else "by a tenth to several times their size"
+                remedy = "a larger sound_speed" if rings else "a smaller courant"
+                found.append(f"slow pressure: {told} {known}; take {remedy}, or isph")
+        return found
 
     def time_step_warning(self) -> str | None:
         """Return a warning if steps are to be taken above the stability law, which it names."""

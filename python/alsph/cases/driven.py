@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import math
 from abc import abstractmethod
+from collections.abc import Container
 from functools import cached_property
 from typing import ClassVar, Self
 
@@ -14,7 +16,7 @@ from pydantic import Field, model_validator
 from alsph.arrays import FloatArray
 from alsph.cases.dimensional import Dimensional
 from alsph.cases.method import Method
-from alsph.engine.prescribed import Rule, asked
+from alsph.engine.prescribed import WORDS, Rule, asked, asymmetry
 from alsph.errors import ConfigError
 from alsph.expressions import VectorExpression
 from alsph.geometry.domain import Domain, SolidBody
@@ -27,6 +29,12 @@ RULES = {
     "motion": "body_motion",
 }
 """What a case may prescribe by place and time: a method in Python, and the parameter that holds an expression."""
+
+SWINGS, SHORT = 200, 1e-3
+"""Number of times at which it is asked how a rule swings, and the step by which its rate is told [D/U]."""
+
+LEAST_RATE = 1e-6
+"""Rate below which nothing swings [U²/D, U³/D²]."""
 
 
 class Driven(Dimensional):
@@ -68,7 +76,38 @@ class Driven(Dimensional):
             raise ConfigError(f"body_motion = {shown(self.body_motion)}: {self.name} has no body to move")
         if self.surface_velocity is not None and not self.sliding_bodies:
             raise ConfigError(f"surface_velocity = {shown(self.surface_velocity)}: {self.name} has no body in place")
+        self.refuse_what_is_not_symmetric(self._expressions)
         return self
+
+    @property
+    def default_until(self) -> float:
+        """End time of a run that is given none [D/U]: by default twice the longest side of the domain over U."""
+        return 2.0 * max(self.checked_domain.size)
+
+    def refuse_what_is_not_symmetric(self, names: Container[str]) -> None:
+        """Refuse rules that are not their own mirror images where a part up to planes of symmetry is computed.
+
+        Parameters
+        ----------
+        names
+            Parameters, or names of methods, that the rules stand in which are looked at.
+        """
+        for name, rule in self.rules.items() if self.planes_of_symmetry else ():
+            parameter = RULES[name]
+            if parameter not in names and name not in names:
+                continue
+            for axis in self.planes_of_symmetry:
+                found = asymmetry(name, rule, self.checked_domain, self.default_until, axis, self.moved_centres)
+                if found:
+                    text = getattr(self, parameter)
+                    given = f"{type(self).__name__}.{name}" if text is None else f"{parameter} = {shown(text)}"
+                    told = f"the {WORDS[name]} is not symmetric in {'xyz'[axis]} = 0, up to which the flow is computed"
+                    raise ConfigError(self.symbols(f"{given}: {told}: {found}"))
+
+    @property
+    def planes_of_symmetry(self) -> tuple[int, ...]:
+        """Axes normal to the planes through 0 that end what is computed, beyond which the flow is its mirror image."""
+        return ()
 
     @property
     def space_dimensions(self) -> int:
@@ -201,6 +240,22 @@ class Driven(Dimensional):
             vectors (b, 6) in 3-D [rad].
         """
         return self._given("body_motion", position, time)
+
+    def swing_period(self, name: str) -> float:
+        """Return the mean period of a ``motion`` or ``forcing`` that swings [D/U]; infinite if it does not.
+
+        It is 2π times the rms of what it swings by, velocity or force, over that of its rate, where the first body is.
+        """
+        centres = self.moved_centres if name == "motion" else np.array([self.checked_bodies[0].center], float)
+        times = np.linspace(0, 1, SWINGS) * self.default_until + 2 * SHORT
+        steps = (-SHORT, 0.0, SHORT)
+        found = [[asked(name, self.rules[name], centres, time + step) for step in steps] for time in times]
+        before, now, after = np.moveaxis(np.array(found)[:, :, 0, : self.space_dimensions], 1, 0)
+        swing, rate = now, (after - before) / (2 * SHORT)
+        if name == "motion":
+            swing, rate = rate, (after - 2 * now + before) / SHORT**2
+        size, change = (float(np.sqrt((each**2).sum(axis=1).mean())) for each in (swing - swing.mean(axis=0), rate))
+        return 2 * math.pi * size / change if change > LEAST_RATE else math.inf
 
     def _given(self, name: str, position: FloatArray, time: float) -> FloatArray | None:
         expression = self._expressions.get(name)

@@ -57,12 +57,22 @@ class FloatingBox(FreeSurface):
         if self.size[0] / 2 > half - 4 * self.particle_spacing:
             told = f"does not fit into a tank_length of {self.tank_length:g}"
             raise ConfigError(f"box_length = {self.box_length:g}: {told}")
-        if not (self.bottom < 1 and 0 < self.draught < self.size[1]):
-            raise ConfigError(f"lift = {self.lift:g}: the box would not be in the water, or not float")
+        for name, size in zip(("box_length", "box_height"), self.size, strict=True):
+            if size <= 0:
+                told = "to whole particle spacings it is none; use a finer resolution"
+                raise ConfigError(f"{name} = {getattr(self, name):g}: {told}")
+        if not 0 < self.draught < self.size[1]:
+            told = f"to whole spacings, 1/{self.resolution}, its draught is {self.draught:g} of a box_height of"
+            remedy = "it would not float; use a finer resolution"
+            raise ConfigError(f"density_ratio = {self.density_ratio:g}: {told} {self.size[1]:g}: {remedy}")
+        if self.bottom >= 1:
+            raise ConfigError(f"lift = {self.lift:g}: the box would not be in the water")
         if self.bottom + self.size[1] <= 1:
             raise ConfigError(f"lift = {self.lift:g}: the box would be under water")
         if min(self.bottom, 1 - self.draught) < 4 * self.particle_spacing:
             raise ConfigError(f"box_height = {self.box_height:g}: the box would stand on the floor")
+        if (top := self.bottom + self.size[1]) > self.tank_height:
+            raise ConfigError(f"tank_height = {self.tank_height:g}: the box, up to {top:g}, would reach out of it")
         self.whole_cells("tank_length", self.tank_length)
         return self
 
@@ -141,6 +151,15 @@ class FloatingBox(FreeSurface):
         """That of the box [ρgH²]."""
         return self.draught * self.size[0]
 
+    def _weights(self, run: Record) -> FloatArray:
+        """Return its weight in every step, with what drives the flow beside gravity where its centre is [ρgH²]."""
+        if "forcing" not in self.rules:
+            return np.full(len(run.history["time"]), self.weight)
+        (start,), history = (body.center for body in self.checked_bodies), run.history
+        way = np.stack([history[f"box_displacement_{axis}"] for axis in "xy"], axis=1)
+        steps = zip(way + start, history["time"] - 0.5 * history["time_step"], strict=True)
+        return -self.weight * np.array([self.body_force_at(place[None], time)[0, 1] for place, time in steps])
+
     def bodies(self) -> list[SolidBody]:
         """Return the box."""
         inertia = self.weight * (self.size[0] ** 2 + self.size[1] ** 2) / 12
@@ -192,7 +211,9 @@ class FloatingBox(FreeSurface):
         time, force = run.history["time"], run.history.get("box_pressure_force_y", np.empty(0))
         late = time > SHOWN
         if late.any() and len(force):
-            mean = float(np.average(force[late], weights=run.history["time_step"][late]) / self.weight)
+            weight = self._weights(run)
+            step = run.history["time_step"][late]
+            mean = float((force[late] * step).sum() / (weight[late] * step).sum())
             turn = float(np.abs(run.history["box_angle"]).max())
             known, source = np.nan if self._whole_lift else 1.0, "Archimedes' principle"
             rows += [

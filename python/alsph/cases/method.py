@@ -52,7 +52,7 @@ def _as_in_the_paper(values: Mapping[str, Any]) -> bool:
     return any(values.get(name) is not None for name in PAPER) or values.get("algorithm") not in (None, "midpoint")
 
 
-def _goes_with(scheme: Any) -> dict[str, Any]:
+def goes_with(scheme: Any) -> dict[str, Any]:
     """Return what goes with a scheme where nothing else is given."""
     return {
         "wall_pressure": "adami" if scheme in tuple(DIFFUSION) else "linear",
@@ -63,12 +63,12 @@ def _goes_with(scheme: Any) -> dict[str, Any]:
 
 def _defaults(scheme: Any) -> dict[str, Any]:
     """Return the values that a scheme has of all parameters which depend on the scheme, where nothing else is given."""
-    return {name: Method.model_fields[name].default for name in _FOLLOWING} | _goes_with(scheme)
+    return {name: Method.model_fields[name].default for name in _FOLLOWING} | goes_with(scheme)
 
 
 def _coefficient_of(*schemes: Any) -> tuple[str, ...]:
     """Name the coefficient of the shifting, which goes with its kind, if a scheme of these has a kind of its own."""
-    return ("shift_coefficient",) if any("shifting" in _goes_with(scheme) for scheme in schemes) else ()
+    return ("shift_coefficient",) if any("shifting" in goes_with(scheme) for scheme in schemes) else ()
 
 
 def superseded(changes: Mapping[str, Any], before: Mapping[str, Any]) -> tuple[str, ...]:
@@ -126,7 +126,7 @@ def of_all_schemes(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def of_scheme(scheme: str, values: Mapping[str, Any]) -> dict[str, Any]:
     """Return those of a case's parameters that belong to a scheme and are not what its own has by default."""
-    defaults = _goes_with(values.get("scheme"))
+    defaults = goes_with(values.get("scheme"))
     own = {name: value for name, value in values.items() if scheme in OWNERS.get(name, ())}
     default = {name: (None, defaults.get(name, Method.model_fields[name].default)) for name in own}
     return {name: value for name, value in own.items() if value not in default[name]}
@@ -305,7 +305,7 @@ class Method(Parameters):
     @classmethod
     def _what_follows_from_others(cls, values: dict[str, Any]) -> dict[str, Any]:
         values = {name: value for name, value in values.items() if value is not None or name not in _FOLLOWING}
-        for name, value in _goes_with(values.get("scheme")).items():
+        for name, value in goes_with(values.get("scheme")).items():
             if values.get(name, value) is None or (name not in values and value != cls.model_fields[name].default):
                 values = values | {name: value}
         if values.get("shift_coefficient") is None:

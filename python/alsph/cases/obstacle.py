@@ -78,6 +78,11 @@ class Obstacle(FreeSurface):
         return 0.5
 
     @property
+    def planes_of_symmetry(self) -> tuple[int, ...]:
+        """Axis y."""
+        return (1,)
+
+    @property
     def initial_volume(self) -> float:
         """That of half of the water [H³]."""
         return float(self.tank[1] * (self.column + (self.tank[0] - self.column) * self.whole(self.wet)))

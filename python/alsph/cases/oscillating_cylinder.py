@@ -14,6 +14,7 @@ from alsph.analysis import sampling
 from alsph.analysis.measures import Measure, Profile
 from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
+from alsph.cases.discretised import LONG
 from alsph.cases.moving_cylinder import MovingCylinder
 
 KNOWN = {"reynolds": 100.0, "keulegan_carpenter": 5.0}
@@ -29,9 +30,6 @@ STATIONS = (-0.6, 0.0, 0.6, 1.2)
 
 BESIDE = 0.01
 """How far [T] a snapshot may be from such a phase: the cylinder's velocity changes by at most 0.06 U in so much."""
-
-LONG = 5.0
-"""Way [D] that pressure travels in a period: with less the force is not that of an incompressible fluid."""
 
 EXPERIMENT = "experiment (Dütsch et al. 1998)"
 SOURCE = "vorticity and stream function on a log-polar grid to 40 D, extrapolated"

@@ -158,13 +158,34 @@ def scheme(name: str | None, wall_pressure: str) -> list[str]:
     return [compared, f"{grows}; use wall_pressure = adami"]
 
 
-def penalty(constant: float) -> list[str]:
-    """Remark on a penalty constant C_BV too small for a fluid that hardly gives way."""
+def without_effect(values: dict[str, object], where: str) -> list[str]:
+    """Remark on parameters, by name, that are given and that nothing depends on, in words where."""
+    if not values:
+        return []
+    told = ", ".join(f"{name} = {value}" for name, value in values.items())
+    return [f"no effect: {told}; nothing depends on {'it' if len(values) == 1 else 'them'} {where}"]
+
+
+def penalty(constant: float, scheme: str | None = None) -> list[str]:
+    """Remark on a constant (c/u_max)² of the penalty or the speed of sound too small for a fluid that hardly gives way.
+
+    Parameters
+    ----------
+    constant
+        C_BV, or (c/u_max)² of another scheme.
+    scheme
+        The scheme; ALSPH if None.
+    """
     mach = constant**-0.5
     if mach <= COMPRESSIBLE:
         return []
-    text = f"the penalty lets the fluid give way as at a Mach number of {mach:.2g}, up to {COMPRESSIBLE:g} was compared"
-    return [f"compressible: {text}; take a smaller courant, or a larger penalty_constant"]
+    what, remedy = {
+        "wcsph": ("speed of sound", "larger sound_speed"),
+        "edac": ("speed of sound", "larger sound_speed"),
+        "explicit_isph": ("step", "smaller mach_number"),
+    }.get(scheme or "", ("penalty", "smaller courant, or a larger penalty_constant"))
+    text = f"the {what} lets the fluid give way as at a Mach number of {mach:.2g}, up to {COMPRESSIBLE:g} was compared"
+    return [f"compressible: {text}; take a {remedy}"]
 
 
 def channel(size: float, inlet: float, outlet: float, share: float, slowed: float) -> list[str]:

@@ -32,6 +32,9 @@ WIDE = 6.0
 START = 6.0
 """Way in which it comes to its velocity [D]."""
 
+DRAG = "C_D at the settling velocity"
+"""Formed with this velocity and πD²/4, not with U: no force follows from it by ½ρU²A."""
+
 
 class SettlingSphere(Case):
     """A free sphere of diameter D that settles from rest in a column with free-slip walls.
@@ -39,7 +42,7 @@ class SettlingSphere(Case):
     U = √(|s - 1| gD) with the density ratio s of sphere and fluid, so that UD/ν is the Galileo number. The weight less
     the buoyancy acts on the sphere; the hydrostatic pressure is left out of p. A quarter of the column is computed, in
     which the flow is symmetric up to a Reynolds number of the sphere of about 210. At the settling velocity V the drag
-    is the weight, C_D V² = 4/3.
+    is the weight, C_D V² = 4/3; no coefficients are formed with U.
     """
 
     name: ClassVar[str] = "settling_sphere"
@@ -51,7 +54,7 @@ class SettlingSphere(Case):
     later_names: ClassVar[tuple[str, ...]] = (
         "settling velocity over the last two diameters",
         "Reynolds number of the sphere",
-        "drag coefficient",
+        DRAG,
         "velocity of the sphere",
     )
 
@@ -78,14 +81,24 @@ class SettlingSphere(Case):
         return self.density_ratio > 1
 
     @property
-    def coefficient_bodies(self) -> list[str]:
-        """Name of the sphere."""
-        return ["sphere"]
+    def reference_area(self) -> float:
+        """Frontal area of the quarter [D²]."""
+        return self.computed_share * math.pi * RADIUS**2
+
+    @property
+    def middle(self) -> FloatArray:
+        """Point that slices for pictures go through [D]: the centre of the sphere at the start."""
+        return self.centre
 
     @property
     def computed_share(self) -> float:
         """Share of the sphere that is computed."""
         return 0.25
+
+    @property
+    def planes_of_symmetry(self) -> tuple[int, ...]:
+        """Axes x and y."""
+        return (0, 1)
 
     @property
     def centre(self) -> FloatArray:
@@ -142,7 +155,7 @@ class SettlingSphere(Case):
         return f"it is of a sphere far from all walls, and holds within 2 % in columns {WIDE:g} D wide or more"
 
     def measures(self, run: Record) -> list[Measure]:
-        """Return the settling velocity over the last two diameters, and the drag coefficient there."""
+        """Return the settling velocity over the last two diameters, and C_D there."""
         way, speed = (np.abs(run.history.get(f"sphere_{name}_z", np.empty(0))) for name in ("displacement", "velocity"))
         if not len(way) or way[-1] < START:
             return []
@@ -154,7 +167,7 @@ class SettlingSphere(Case):
         found = [
             Measure("settling velocity over the last two diameters", velocity),
             Measure("Reynolds number of the sphere", own),
-            Measure("drag coefficient", drag, expected, 0.05, "Johnson and Patel (1999), a sphere far from all walls"),
+            Measure(DRAG, drag, expected, 0.05, "Johnson and Patel (1999), a sphere far from all walls"),
         ]
         return self.compared(found)
 

@@ -32,6 +32,9 @@ IRROTATIONAL = (12, 16)
 AGREEMENT = 0.03
 """... this of the largest elevation."""
 
+RESONANT = 1e-7
+"""Share of a mode's frequency within which it is driven at it, to rounding."""
+
 STEEP = 2.0
 """Slope of the surface with which such a wave breaks, at the latest."""
 
@@ -185,15 +188,19 @@ class Sloshing(FreeSurface):
     def linear_level(self, time: FloatArray, x: float) -> FloatArray:
         """Return the elevation (n,) at times (n,) and a place, of linear theory [H].
 
-        Every mode cos kx is an oscillator of ω² = gk tanh kH that the tilted level of rest, x − L/2 in modes, drives.
+        Every mode cos kx is an oscillator of ω² = gk tanh kH that the tilted level of rest, x − L/2 in modes, drives;
+        one that is driven at its own frequency grows with time.
         """
         wave = np.pi * MODES / self._whole_length
         own, drive = np.sqrt(wave * np.tanh(wave)), self.frequency
-        share = -4 / (self._whole_length * wave**2) * own**2 * self._size / (own**2 - drive**2)
+        share = -4 / (self._whole_length * wave**2) * own**2 * self._size
         phase, time = np.radians(self.phase), np.asarray(time)[:, None]
         forced = np.cos(drive * time - phase)
         free = np.cos(phase) * np.cos(own * time) + drive / own * np.sin(phase) * np.sin(own * time)
-        return np.asarray(((forced - free) * share) @ np.cos(wave * x))
+        grows = np.abs(own - drive) < RESONANT * drive
+        resonant = time * np.sin(drive * time - phase) + np.sin(phase) * np.sin(drive * time) / drive
+        answer = np.where(grows, resonant / (2 * drive), (forced - free) / np.where(grows, 1, own**2 - drive**2))
+        return np.asarray((answer * share) @ np.cos(wave * x))
 
     def measures(self, run: Record) -> list[Measure]:
         """Return the elevation at the gauge beside theory, linear or not, and the crests beside the experiment's."""

@@ -66,10 +66,15 @@ class Spatial(Channel):
     def _is_symmetric(self) -> Self:
         if self.quarter and len(self._volume.flips) < 2:
             raise ValueError(f"quarter = true: the {self.body_name} is not its own mirror image in y and in z")
-        if self.quarter and self.body_offset:
-            told = f"body_offset = {self.body_offset:g}"
-            raise ValueError(f"quarter = true: not with {told}, which leaves the flow no symmetry")
+        for name in ("body_offset", "perturbation"):
+            if self.quarter and (value := getattr(self, name)):
+                raise ValueError(f"quarter = true: not with {name} = {value:g}, which leaves the flow no symmetry")
         return self
+
+    @property
+    def planes_of_symmetry(self) -> tuple[int, ...]:
+        """Axes y and z, of a quarter."""
+        return (1, 2) if self.quarter else ()
 
     @cached_property
     def _volume(self) -> Volume:

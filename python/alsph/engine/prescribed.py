@@ -165,6 +165,21 @@ def fingerprint(name: str, rule: Rule, domain: Domain, until: float, centres: Fl
     With `centres` (b, d), of bodies that a motion moves, what it gives there.
     """
     total = hashlib.sha256()
+    for points in [centres] if centres is not None else _points(name, domain):
+        for time in _times(until):
+            values = asked(name, rule, points, time)
+            # In single precision, which no rounding of another mathematical library reaches.
+            total.update(b"" if values is None else np.ascontiguousarray(values, np.float32).tobytes())
+    return total.hexdigest()
+
+
+def _times(until: float) -> list[float]:
+    """Return the times at which rules are told apart [D/U]: no multiples of a period."""
+    return [float(share * until) for share in (np.arange(SAMPLES) * 0.618034) % 1]
+
+
+def _points(name: str, domain: Domain) -> list[FloatArray]:
+    """Return points of a domain, or for an inflow of each of its inlets."""
     shares = (np.arange(SAMPLES) + 0.5) / SAMPLES
     lower, upper = np.array(domain.lower), np.array(domain.upper)
     axes = list(lower[:, None] + np.outer(upper - lower, shares))
@@ -174,12 +189,48 @@ def fingerprint(name: str, rule: Rule, domain: Domain, until: float, centres: Fl
             [np.array([plane]) if k == axis else values for k, values in enumerate(axes)]
             for axis, _, plane in domain.inlets()
         ]
-    for points in [lattice(*grid) for grid in grids] if centres is None else [centres]:
-        for share in (np.arange(SAMPLES) * 0.618034) % 1:  # no multiples of a period
-            values = asked(name, rule, points, float(share * until))
-            # In single precision, which no rounding of another mathematical library reaches.
-            total.update(b"" if values is None else np.ascontiguousarray(values, np.float32).tobytes())
-    return total.hexdigest()
+    return [lattice(*grid) for grid in grids]
+
+
+def asymmetry(name: str, rule: Rule, domain: Domain, until: float, axis: int, centres: FloatArray) -> str:
+    """Say where a rule is not its own mirror image in the plane through 0 normal to an axis; return nothing if it is.
+
+    Parameters
+    ----------
+    name, rule
+        What is prescribed, and by what.
+    domain
+        The domain, whose other half is the mirror image.
+    until
+        Latest of the times at which the rule is asked [D/U].
+    axis
+        0, 1 or 2.
+    centres
+        Of the bodies that a motion moves (b, d) [D].
+    """
+    flip = 1.0 - 2.0 * np.eye(domain.dimensions)[axis]
+    for points in [centres] if name == "motion" else _points(name, domain):
+        begun = [asked(name, rule, each, 0.0) if name == "motion" else None for each in (points, flip * points)]
+        for time in _times(until):
+            found = [asked(name, rule, each, time) for each in (points, flip * points)]
+            here, there = (
+                None if now is None else now - (0.0 if first is None else first)
+                for now, first in zip(found, begun, strict=True)
+            )
+            if here is None or there is None:
+                continue
+            # What turns is mirrored as an axial vector.
+            turned = -flip if domain.dimensions == 3 else np.array([-1.0])
+            image = np.concatenate([flip, turned])[: here.shape[1]] * there
+            apart = np.abs(here - image).max(axis=1)
+            if (apart > ROUND_OFF * np.abs(here).max()).any():
+                at = int(np.nanargmax(apart))
+                values, mirrored, where = (
+                    "(" + ", ".join(f"{number:.4g}" for number in each) + ")"
+                    for each in (here[at] + 0.0, image[at] + 0.0, points[at] + 0.0)
+                )
+                return f"at {where} and t* = {time:.4g} it gives {values}, where its mirror image has {mirrored}"
+    return ""
 
 
 def backflow(domain: Domain, position: FloatArray, velocity: FloatArray, time: float) -> str:
@@ -237,11 +288,11 @@ def crossing(rule: Rule, place: FloatArray, normal: FloatArray, until: float) ->
     _, near = neighbour_tree(place).query(place, k=3)
     flat = np.einsum("mkd,md->mk", normal[near], normal).min(axis=1) > FLAT
     place, normal = place[flat], normal[flat]
-    for share in (np.arange(SAMPLES) * 0.618034) % 1:
-        velocity = asked("sliding", rule, place, float(share * until))
+    for time in _times(until):
+        velocity = asked("sliding", rule, place, time)
         assert velocity is not None
         through = np.abs((velocity * normal).sum(axis=1))
         if through.max(initial=0.0) > THROUGH * np.linalg.norm(velocity, axis=1).max(initial=0.0):
             where = ", ".join(f"{x:.4g}" for x in place[through.argmax()])
-            return f"a component of {through.max():.3g} U through the surface at ({where}), t* = {share * until:.4g}"
+            return f"a component of {through.max():.3g} U through the surface at ({where}), t* = {time:.4g}"
     return ""

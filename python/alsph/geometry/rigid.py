@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from alsph.arguments import number
 from alsph.errors import ConfigError
 from alsph.geometry.points import numbers
 from alsph.text import shown
@@ -87,10 +88,10 @@ class Rigid:
         for name in ("stiffness", "damping"):
             if min(vectors[name]) < 0:
                 raise ConfigError(f"rigid: {name} = {shown(getattr(self, name))}: must not be negative")
-        own = {name: self._number(name, least) for name, least in (("mass", 0.0), ("displaced", 0.0))}
+        own = {name: self._number(name, above=0.0) for name in ("mass", "displaced")}
         length = (own["displaced"] / np.pi) ** 0.5 if dimensions == 2 else (own["displaced"] * 0.75 / np.pi) ** (1 / 3)
-        mass = ADDED_MASS * own["displaced"] if self.added_mass is None else self._number("added_mass", -1.0)
-        inertia = 0.25 * mass * length**2 if self.added_inertia is None else self._number("added_inertia", -1.0)
+        mass = ADDED_MASS * own["displaced"] if self.added_mass is None else self._number("added_mass")
+        inertia = 0.25 * mass * length**2 if self.added_inertia is None else self._number("added_inertia")
         return vectors | {
             "mass": own["mass"],
             "inertia": self._vector("inertia", np.ravel(self.inertia), turns**2),
@@ -99,11 +100,11 @@ class Rigid:
             "added_inertia": inertia,
         }
 
-    def _number(self, name: str, below: float) -> float:
-        value = numbers(getattr(self, name))
-        if value.shape != () or not value > below:
-            raise ConfigError(f"rigid: {name} = {shown(getattr(self, name))}: must be a number above {max(below, 0):g}")
-        return float(value)
+    def _number(self, name: str, above: float | None = None) -> float:
+        found = number(f"rigid: {name}", getattr(self, name), above, finite=True)
+        if found < 0:
+            raise ConfigError(f"rigid: {name} = {shown(getattr(self, name))}: must not be negative")
+        return found
 
     def _vector(self, name: str, given: object, count: int) -> list[float]:
         vector = numbers(given)

@@ -38,7 +38,9 @@ class Loads(Fields):
         choose("part", part, ("total", "pressure", "viscous"))
         if body is not None:
             choose("body", body, self.bodies or [known.name for known in self.config.case.checked_bodies])
-        names = [body] if body else self.config.case.coefficient_bodies or self.bodies[:1]
+        free = {known.name for known in self.config.case.checked_bodies if known.rigid}
+        walls = [name for name in self.bodies if name not in free][:1]
+        names = [body] if body else self.config.case.coefficient_bodies or walls
         return names, ("pressure", "viscous") if part == "total" else (part,)
 
     def coefficient(self, axis: str, part: str = "total", body: str | None = None) -> FloatArray:
@@ -50,7 +52,7 @@ class Loads(Fields):
             Direction of the force; drag is ``x`` and lift ``y``.
         part : {"total", "pressure", "viscous"}
         body : str, optional
-            Name of the body; if None those of :attr:`body` together, or the first one between walls.
+            Name of the body; if None those of :attr:`body` together, or between walls the first that is not free.
 
         Returns
         -------

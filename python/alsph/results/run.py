@@ -32,7 +32,7 @@ from alsph.results.export import Grid
 from alsph.results.judged import ELSEWHERE, goes_on_elsewhere, judged, stands_alone
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.loads import Loads
-from alsph.results.outcome import made, outcome, unsolved
+from alsph.results.outcome import ended_early, made, outcome, unsolved
 from alsph.tables import html
 from alsph.text import duration, in_figure, printable, shown
 from alsph.units import Units
@@ -137,8 +137,9 @@ class Run(Loads):
         case = self.config.case
         solved = unsolved(self, case.residual_tolerance, case.most_iterations)
         found = [
-            *outcome(self, self.config.until_in_words),
+            *outcome(self, self.config.until_in_words, case.scheme),
             *solved,
+            *(ended_early(self) if case.residual_tolerance and case.solver == "jacobi" else []),
             *made(self.measures),
             *self._judged[1],
             *([ELSEWHERE] if goes_on_elsewhere(self, self.config) else []),

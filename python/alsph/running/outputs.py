@@ -28,6 +28,9 @@ PROBE_INTERVAL = 0.05
 PLANE_INTERVAL = 0.5
 """The same of planes."""
 
+ROUNDING = 1e-9
+"""Depth below a surface up to which a point lies on it [D]."""
+
 
 class Samples:
     """Fields at fixed points over time."""
@@ -55,6 +58,18 @@ class Samples:
     def truncate(self, path: Path, time: float) -> None:
         """Drop later samples."""
         samples.truncate(path, time)
+
+
+class Probes(Samples):
+    """Fields at points over time, NaN while a body is there."""
+
+    def sample(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> dict[str, FloatArray]:
+        """Return the ``velocity`` (m, d) and ``pressure`` (m,) at the points."""
+        found = super().sample(simulation, rows)
+        inside = _below_a_surface(self.points["position"], simulation.state())
+        for values in found.values():
+            values[inside] = np.nan
+        return found
 
 
 class Planes(Samples):
@@ -102,22 +117,28 @@ def remarks_of(config: Config, state: Mapping[str, Any]) -> list[str]:
 
 
 def _in_a_body(probes: FloatArray, state: Mapping[str, Any]) -> list[str]:
-    """Remark on probes below the surface of the solid particle next to them."""
-    solid = np.asarray(state["kind"]) == Kind.SOLID
-    if not (len(probes) and solid.any()):
-        return []
-    from scipy.spatial import KDTree  # takes its time
-
-    position, normal, depth = (np.asarray(state[name])[solid] for name in ("position", "normal", "depth"))
-    away, next_ = KDTree(position).query(probes)
-    fluid = KDTree(np.asarray(state["position"])[~solid]).query(probes)[0]
-    below = ((probes - position[next_]) * normal[next_]).sum(axis=1) < depth[next_]
-    inside = probes[(away < fluid) & below]
+    """Remark on probes that lie in a body at the start."""
+    inside = probes[_below_a_surface(probes, state)] if len(probes) else probes
     if not len(inside):
         return []
     where = ", ".join(f"{x:g}" for x in inside[0])
     are = "of the points lies" if len(inside) == 1 else "of the points lie"
-    return [f"probes: {len(inside)} {are} in a body, as ({where}): what they record is no flow; move them"]
+    return [f"probes: {len(inside)} {are} in a body, as ({where}): nothing is recorded there; move them"]
+
+
+def _below_a_surface(points: FloatArray, state: Mapping[str, Any]) -> NDArray[np.bool_]:
+    """Whether points (m, d) lie below the surface of the solid particle next to them, and no fluid is nearer."""
+    solid = np.asarray(state["kind"]) == Kind.SOLID
+    if not solid.any():
+        return np.zeros(len(points), bool)
+    from scipy.spatial import KDTree  # takes its time
+
+    position, normal, depth = (np.asarray(state[name])[solid] for name in ("position", "normal", "depth"))
+    away, next_ = KDTree(position).query(points)
+    below = np.asarray(((points - position[next_]) * normal[next_]).sum(axis=1) < depth[next_] - ROUNDING)
+    if below.any():  # else no tree of all the fluid
+        below[below] = away[below] < KDTree(np.asarray(state["position"])[~solid]).query(points[below])[0]
+    return below
 
 
 def outputs_of(config: Config) -> list[Output]:
@@ -157,7 +178,7 @@ def _samples_of(config: Config) -> Iterator[Samples]:
     if points:
         yield SurfacePressure(points, run.surface_interval, config.case)
     if len(probes):
-        yield Samples("probes.h5", run.probe_interval or PROBE_INTERVAL, {"position": probes})
+        yield Probes("probes.h5", run.probe_interval or PROBE_INTERVAL, {"position": probes})
     if planes:
         number = np.repeat(np.arange(len(planes)), [*map(len, planes)])
         where = {"position": np.concatenate(planes), "plane": number}
