@@ -97,7 +97,7 @@ PYTHON = Path(__file__).parents[1] / "python" / "alsph"
 PYTHON_FLOORS = (
     ("_alsph", "arrays", "text"),
     ("errors", "tables"),
-    ("memory", "parameters", "expressions", "symbols"),
+    ("arguments", "memory", "parameters", "expressions", "symbols"),
     ("geometry", "reference", "run_settings", "units"),
     ("analysis", "engine"),
     ("cases", "folder"),

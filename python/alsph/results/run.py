@@ -18,6 +18,7 @@ from alsph.analysis.measures import Measure, Measures, Profile
 from alsph.analysis.probes import GaugeRecord
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
+from alsph.cases.answers import is_own
 from alsph.cases.free_surface import Gauges
 from alsph.cases.source import shown_name
 from alsph.errors import ConfigError, RunFolderError
@@ -29,7 +30,7 @@ from alsph.geometry.plane import Plane
 from alsph.parameters import choose
 from alsph.results.dimensional import dimensional
 from alsph.results.export import Grid
-from alsph.results.judged import ELSEWHERE, goes_on_elsewhere, judged, stands_alone
+from alsph.results.judged import ELSEWHERE, drawn, goes_on_elsewhere, judged
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.loads import Loads
 from alsph.results.outcome import made, outcome, unsolved
@@ -102,7 +103,6 @@ class Run(Loads):
 
     @cached_property
     def _judged(self) -> tuple[list[Measure], list[str]]:
-        """The measures, and what went wrong with them in code of the user's."""
         return judged(self, self.config)
 
     @cached_property
@@ -118,10 +118,12 @@ class Run(Loads):
 
     @cached_property
     def profiles(self) -> list[Profile]:
-        """Curves of the run beside their reference curves."""
-        found, case = self.config.case.profiles(self), self.config.case
-        alone = case.no_reference or stands_alone(self, self.config)
-        return [profile.alone() for profile in found] if alone else found
+        """Curves of the run beside their reference curves; none if the case's own code fails."""
+        return self._drawn[0]
+
+    @cached_property
+    def _drawn(self) -> tuple[list[Profile], list[str]]:
+        return drawn(self, self.config)
 
     @cached_property
     def ledger(self) -> Ledger:
@@ -141,6 +143,7 @@ class Run(Loads):
             *solved,
             *made(self.measures),
             *self._judged[1],
+            *(self._drawn[1] if is_own(case) else []),
             *([ELSEWHERE] if goes_on_elsewhere(self, self.config) else []),
             *self.config.remarks,
         ]
@@ -437,7 +440,7 @@ class Run(Loads):
 
 def _plotting() -> ModuleType:
     """Return :mod:`alsph.plotting`, which draws runs: the door of the ``plot_`` methods."""
-    from alsph import plotting
+    from alsph import plotting  # with matplotlib
 
     return plotting
 

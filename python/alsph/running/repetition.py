@@ -8,7 +8,8 @@ from typing import Any
 from alsph import config
 from alsph.config import Config
 from alsph.engine.prescribed import WORDS, difference
-from alsph.engine.simulation import SLICE_SECONDS, Simulation
+from alsph.engine.simulation import Simulation
+from alsph.engine.times import SLICE_SECONDS
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.folder import checkpoint
 from alsph.folder.history import UNKNOWN, flatten, lines
