@@ -139,12 +139,7 @@ class Profile:
         if not (_is_pair(self.axes) and all(isinstance(axis, str) for axis in self.axes)):
             raise ConfigError(f"profile '{self.name}': axes = {shown(self.axes)}: must be two texts")
         for name in ("computed", "reference"):
-            given = getattr(self, name)
-            pair = [_numbers(each) for each in given] if _is_pair(given) else []
-            if any(each is None for each in pair) or len({len(each) for each in pair if each is not None}) != 1:
-                told = "must be two arrays of numbers, of one length"
-                raise ConfigError(f"profile '{self.name}': {name} = {shown(given)}: {told}")
-            object.__setattr__(self, name, tuple(pair))
+            object.__setattr__(self, name, checked_curve(f"profile '{self.name}': {name}", getattr(self, name)))
         if not isinstance(self.source, str):
             raise ConfigError(f"profile '{self.name}': source = {shown(self.source)}: must be a text")
 
@@ -156,6 +151,20 @@ class Profile:
     def file_name(self) -> str:
         """Name of the file, without suffix, that its figure is saved in."""
         return "_".join(re.findall(r"\w+", re.sub(r"-(?=\d)", "minus ", self.name.lower())))
+
+
+def checked_curve(name: str, given: Any) -> tuple[FloatArray, FloatArray]:
+    """Return abscissae and ordinates (n,) of a curve.
+
+    Raises
+    ------
+    ConfigError
+        If they are none; the message begins with `name`.
+    """
+    pair = [array for each in given if (array := _numbers(each)) is not None] if _is_pair(given) else []
+    if len(pair) != 2 or len(pair[0]) != len(pair[1]):
+        raise ConfigError(f"{name} = {shown(given)}: must be two arrays of numbers, of one length")
+    return pair[0], pair[1]
 
 
 def _is_pair(value: Any) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator
@@ -10,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from alsph.arguments import number
+from alsph.arguments import number, real
 from alsph.arrays import Arrays
 from alsph.errors import AlsphError, ConfigError
 from alsph.text import shown
@@ -120,3 +121,21 @@ def end_time(case: object, ask: Callable[[], float]) -> float:
     with told(what, case):
         given = ask()
     return number(what, given, above=0, unit="D/U", finite=True)
+
+
+def vector(case: object, method: str, dimensions: int, ask: Callable[[], Any]) -> list[float]:
+    """Return a vector that a method of a case gives.
+
+    Raises
+    ------
+    ConfigError
+        If it fails, or gives not a finite number for each direction.
+    """
+    what = f"{type(case).__name__}.{method}()"
+    with told(what, case):
+        given = ask()
+        parts = None if isinstance(given, str | bytes) or not isinstance(given, Iterable) else [*map(real, given)]
+    found = [part for part in parts or [] if part is not None and math.isfinite(part)]
+    if parts is None or not len(found) == len(parts) == dimensions:
+        raise ConfigError(f"{what} gave {shown(given)}: it must return {dimensions} finite numbers")
+    return found

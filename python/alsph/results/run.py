@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import shlex
 from collections.abc import Callable
 from functools import cached_property
@@ -16,6 +15,7 @@ import numpy as np
 from alsph.analysis.averages import Estimate
 from alsph.analysis.measures import Measure, Measures, Profile
 from alsph.analysis.probes import GaugeRecord
+from alsph.arguments import path_of
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
 from alsph.cases.answers import is_own
@@ -65,9 +65,7 @@ class Run(Loads):
     """
 
     def __init__(self, path: str | Path) -> None:
-        if not isinstance(path, str | os.PathLike):
-            raise ConfigError(f"run = {shown(path)}: must be the path of a run folder")
-        self.path = Path(path)
+        self.path = path_of("run", path, "run folder")
         if not self.path.is_dir():
             there = "a file, and no run folder" if self.path.exists() else "no such run folder"
             raise RunFolderError(f"{self.path}: {there}")
@@ -388,6 +386,8 @@ class Run(Loads):
         if isinstance(profile, str):
             choose("profile", profile, named := {each.name: each for each in self.profiles})
             profile = named[profile]
+        elif not isinstance(profile, Profile):
+            raise ConfigError(f"profile = {shown(profile)}: must be one of run.profiles, or its name")
         return self._saved(_plotting().profile({"computed": profile}), path)
 
     def plot_gauges(self, path: str | Path | None = None) -> Figure:
@@ -440,7 +440,7 @@ class Run(Loads):
 
 def _plotting() -> ModuleType:
     """Return :mod:`alsph.plotting`, which draws runs: the door of the ``plot_`` methods."""
-    from alsph import plotting  # with matplotlib
+    from alsph import plotting
 
     return plotting
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from alsph import config
+from alsph.arguments import path_of
 from alsph.config import Config
 from alsph.engine.prescribed import WORDS, difference
 from alsph.engine.simulation import Simulation
@@ -79,7 +80,7 @@ def repeat(path: str | Path, threads: int | None = None, *, progress: bool = Tru
     SolverError
         If the computation breaks down, which it did not in the run.
     """
-    folder = RunFolder(Path(path))
+    folder = RunFolder(path_of("run", path, "run folder"))
     info, settings = folder.info(), config.of_run(folder.path).run
     if not info.get("segments") or not info.get("checkpoint"):
         raise RunFolderError(f"{path}/run.json does not tell with what steps the run was made; it is of an older alsph")
