@@ -76,7 +76,7 @@ class Measure:
     @property
     def error(self) -> float:
         """Deviation from the reference over its modulus; the value itself where the reference is zero."""
-        return (self.value - self.reference) / (abs(self.reference) or 1.0)
+        return (float(self.value) - float(self.reference)) / (abs(self.reference) or 1.0)
 
     @property
     def passed(self) -> bool:
