@@ -10,6 +10,7 @@ from alsph import cases
 from alsph.analysis.measures import Measure, Profile
 from alsph.cases.series import Series
 from alsph.errors import ConfigError, SharedError
+from alsph.geometry.particles import at_one_place
 from alsph.results.judged import NUMBERED, OWN_NAMES
 
 EMPTY = (np.empty(0), np.empty(0))
@@ -83,6 +84,26 @@ def test_arrays_of_particles_are_whole(own):
         own(particles=lambda self: {name: state[name] for name in state if name != "depth"}).build()
     with pytest.raises(ConfigError, match=r"gave an array `pressure` of \(3,\) for \(64,\) particles"):
         own(particles=lambda self: state | {"pressure": np.zeros(3)}).build()
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-16])
+def test_two_particles_at_one_place_are_refused(own, apart):
+    state = cases.TaylorGreen(resolution=8).particles()
+    twice = {name: np.concatenate([values, values[5:6]]) for name, values in state.items()}
+    twice["position"][-1] += apart
+    x, y = state["position"][5]
+    told = f"Own.particles() gave two particles at one place, ({x:.6g}, {y:.6g}) [D]: fluid and fluid; leave one out"
+    with pytest.raises(ConfigError, match=re.escape(told)):
+        own(particles=lambda self: twice).build()
+    twice["kind"][-1] = 3
+    with pytest.raises(ConfigError, match="fluid and solid"):
+        own(particles=lambda self: twice).build()
+
+
+def test_solids_of_two_faces_may_share_a_place():
+    place = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.0]])
+    assert not len(at_one_place(place, np.array([False, True, True]), 0.1))
+    assert at_one_place(place, np.array([False, False, True]), 0.1).tolist() == [1, 2]
 
 
 class Odd(Series):

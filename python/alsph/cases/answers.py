@@ -14,9 +14,10 @@ import numpy as np
 from alsph.arguments import number, real
 from alsph.arrays import Arrays
 from alsph.errors import AlsphError, ConfigError
+from alsph.geometry.particles import Kind, at_one_place
 from alsph.text import shown
 
-Kind = TypeVar("Kind")
+Thing = TypeVar("Thing")
 
 ARRAYS = ("position", "velocity", "pressure", "kind", "body", "normal", "depth")
 """What particles have."""
@@ -69,7 +70,7 @@ def told(what: str, thing: object) -> Iterator[None]:
         raise ConfigError(f"{what} fails, {reason(error, place(thing))}") from error
 
 
-def listed(case: object, method: str, kind: Any, ask: Callable[[], Iterable[Kind]]) -> list[Kind]:
+def listed(case: object, method: str, kind: Any, ask: Callable[[], Iterable[Thing]]) -> list[Thing]:
     """Return what a method of a case gives as a list, be it a generator.
 
     Raises
@@ -88,13 +89,13 @@ def listed(case: object, method: str, kind: Any, ask: Callable[[], Iterable[Kind
     return found
 
 
-def particles(case: object, ask: Callable[[], Arrays]) -> Arrays:
+def particles(case: object, ask: Callable[[], Arrays], spacing: float) -> Arrays:
     """Return the arrays of particles that a case gives.
 
     Raises
     ------
     ConfigError
-        If it fails or gives none.
+        If it fails or gives none, or two of them at one place.
     """
     what = f"{type(case).__name__}.particles()"
     with told(what, case):
@@ -106,6 +107,12 @@ def particles(case: object, ask: Callable[[], Arrays]) -> Arrays:
     if odd := [name for name in ARRAYS if np.shape(given[name])[:1] != np.shape(given["kind"])]:
         numbers = f"{np.shape(given[odd[0]])[:1]} for {np.shape(given['kind'])} particles"
         raise ConfigError(f"{what} gave an array `{odd[0]}` of {numbers}: each has an entry a particle")
+    position, kind = np.asarray(given["position"]), np.asarray(given["kind"])
+    if position.ndim == 2 and position.dtype.kind == "f" and np.isfinite(position).all():
+        if len(pair := at_one_place(position, kind == Kind.SOLID, spacing)):
+            kinds = " and ".join(Kind(int(each)).name.lower() for each in kind[pair])
+            where = ", ".join(f"{x:.6g}" for x in position[pair[0]])
+            raise ConfigError(f"{what} gave two particles at one place, ({where}) [D]: {kinds}; leave one out")
     return given
 
 

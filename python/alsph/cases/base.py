@@ -294,7 +294,7 @@ class Case(Discretised):
             If the particles would not fit into the memory that is free, or surfaces would slide through themselves.
         """
         self.check_memory(threads)
-        state = answers.particles(self, self.particles)
+        state = answers.particles(self, self.particles, self.particle_spacing)
         self._warn_of_unused_velocities(state)
         self._refuse_surfaces_that_let_through(state)
         return self.problem(state)

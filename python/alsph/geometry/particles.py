@@ -87,6 +87,26 @@ def check_part(name: str, snapshot: Snapshot, lower: ArrayLike, upper: ArrayLike
         raise ConfigError(f"{name}: lies outside of the domain, {bounds} [D]")
 
 
+SAME = 1e-3
+"""Distance [Δx] within which particles lie at one place."""
+
+
+def at_one_place(position: FloatArray, solid: NDArray[np.bool_], spacing: float) -> NDArray[np.int_]:
+    """Return the indices (2,) of two particles at one place, one of them fluid, or none (0,).
+
+    Solid ones may share a place: those of the two faces of a thin body do. Small cells are compared, by one number
+    each that is theirs alone up to rounding, which takes a tenth of the time of a tree.
+    """
+    cells = np.floor(position / (SAME * spacing) + 1 / np.pi)
+    key = sum((column * n**0.5 for column, n in zip(cells.T, (1, 2, 3), strict=False)), np.zeros(len(cells)))
+    order = np.argsort(key, kind="stable")
+    for first in np.flatnonzero(np.diff(key[order]) == 0):
+        pair = order[[first, first + 1]]
+        if np.array_equal(*cells[pair]) and not solid[pair].all():
+            return pair
+    return np.empty(0, int)
+
+
 def neighbour_tree(position: FloatArray) -> KDTree:
     """Return a tree to find the neighbours of points among positions (n, d)."""
     from scipy.spatial import KDTree  # half a second that most commands do without
