@@ -94,9 +94,7 @@ def coefficients(runs: dict[str, Run]) -> Figure:
             axes.set_ylim(limits)
         axes.set_ylabel(f"${symbol}$")
         axes.grid(alpha=0.3)
-    figure.legend(
-        *upper.get_legend_handles_labels(), loc="outside upper right", ncols=4, fontsize="small", frameon=False
-    )
+    upper.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=3, fontsize="small", frameon=False)
     lower.set_xlabel(TIME_LABEL)
     return figure
 
