@@ -12,6 +12,7 @@ from alsph.cases.series import Series
 from alsph.errors import ConfigError, SharedError
 from alsph.geometry.particles import at_one_place
 from alsph.results.judged import NUMBERED, OWN_NAMES
+from alsph.study.results import OF_ALL_RUNS, RULE
 
 EMPTY = (np.empty(0), np.empty(0))
 
@@ -243,5 +244,6 @@ def test_names_that_results_have_are_known(tmp_path, scheme):
         run = case.run(tmp_path / case.name, until=0.02, threads=1, progress=False)
         run.measures = []
         names |= {*run.summary()} - {*(run.dimensional() if case.units else ())}
+    names |= {*OF_ALL_RUNS, RULE, "status", "time", "seconds", "folder", "remarks", "message"}
     own = {name for name in names if not NUMBERED.fullmatch(name)}
     assert own <= OWN_NAMES, own - OWN_NAMES
