@@ -42,7 +42,7 @@ def run(own, tmp_path):
     """Return a function that makes a run of a case with these methods."""
 
     def make(**methods):
-        return own(**methods).run(tmp_path / "run", until=0.03, threads=1, progress=False)
+        return own(**methods).run(tmp_path / "run", until=0.03, threads=1, force=True, progress=False)
 
     return make
 
@@ -215,6 +215,13 @@ def test_measures_and_profiles_that_fail_are_a_remark(run, method):
     assert getattr(found, method) == []
     assert any(f"no {method}: Own.{method}() fails, line" in remark for remark in found.remarks)
     assert found.summary()["status"] == "finished"
+
+
+def test_measures_of_what_a_run_has_not_are_a_remark(run):
+    found = run(measures=lambda self, run: [Measure("m", run.to_grid(spacing=-1.0).time)])
+    assert any("no measures: Own.measures() fails, spacing = -1.0: must be" in remark for remark in found.remarks)
+    found = run(measures=lambda self, run: alsph.Run(run.path / "none").measures)
+    assert any("no measures: Own.measures() fails, " in remark and "no such run" in remark for remark in found.remarks)
 
 
 @pytest.mark.parametrize(

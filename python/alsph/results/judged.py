@@ -12,7 +12,7 @@ from alsph.analysis.record import Record
 from alsph.cases import answers
 from alsph.cases.method import Method
 from alsph.config import Config
-from alsph.errors import ConfigError
+from alsph.errors import AlsphError, ConfigError
 from alsph.geometry.particles import Snapshot
 from alsph.results.outcome import changes
 from alsph.run_settings import RunSettings
@@ -82,13 +82,15 @@ def drawn(run: Record, config: Config) -> tuple[list[Profile], list[str]]:
 def _told(what: str, config: Config, ask: Callable[[], list[Judged]]) -> tuple[list[Judged], list[str]]:
     """Return what is found, or why code of the user's finds nothing."""
     case = config.case
+    name = f"{type(case).__name__}.{what}()"
     try:
-        with answers.told(f"{type(case).__name__}.{what}()", case):
+        with answers.told(name, case):
             return ask(), []
-    except ConfigError as error:
+    except AlsphError as error:
         if not answers.is_own(case):
             raise
-        return [], [f"no {what}: {error}; correct the file that defines it"]
+        why = str(error) if str(error).startswith(name) else f"{name} fails, {error}"
+        return [], [f"no {what}: {why}; correct the file that defines it"]
 
 
 def _measures(run: Record, config: Config) -> list[Measure]:
