@@ -325,3 +325,47 @@ def test_observed_order():
     assert averages.observed_order((10, 30), (27.0, 1.0)) == pytest.approx(3)
     for error in ((0.0, 1.0), (1.0, 0.0), (math.nan, 1.0), (1.0, math.nan)):
         assert math.isnan(averages.observed_order((10, 20), error))
+
+
+def same(found, value, uncertainty, note=""):
+    """Whether an estimate is this one."""
+    assert type(found) is Estimate and found.note == note
+    assert float(found) == pytest.approx(value) and found.uncertainty == pytest.approx(uncertainty, nan_ok=True)
+
+
+def test_arithmetic_keeps_the_uncertainty():
+    a, b = Estimate(3.0, 0.3, "a"), Estimate(2.0, 0.4)
+    same(a + b, 5.0, 0.5, "a")
+    same(a - b, 1.0, 0.5, "a")
+    same(a * b, 6.0, math.hypot(0.3 * 2, 0.4 * 3), "a")
+    same(a / b, 1.5, 1.5 * math.hypot(0.1, 0.2), "a")
+    same(-a, -3.0, 0.3, "a")
+    for two in (2, 2.0, np.float64(2), np.int64(2), np.float32(2)):
+        same(two * a, 6.0, 0.6, "a")
+        same(a * two, 6.0, 0.6, "a")
+        same(two - a, -1.0, 0.3, "a")
+        same(a / two, 1.5, 0.15, "a")
+        same(two / a, 2 / 3, 2 / 9 * 0.3, "a")
+        same(two + a, 5.0, 0.3, "a")
+    same(sum([a, b]), 5.0, 0.5, "a")
+
+
+def test_a_ratio_says_what_is_unknown_and_what_still_develops():
+    known, unknown, unbounded = Estimate(2.0, 0.1), Estimate(1.0), Estimate(4.0, np.inf, "still developing")
+    same(unknown / known, 0.5, np.nan)
+    same(unbounded / known, 2.0, np.inf, "still developing")
+    assert (known / unbounded).developing
+    same(unbounded * 0, 0.0, np.inf, "still developing")
+    same(Estimate(1.0, 0.1, "one") + Estimate(1.0, 0.1, "two"), 2.0, math.hypot(0.1, 0.1), "one; two")
+    with pytest.raises(ZeroDivisionError):
+        known / 0
+    with pytest.raises(TypeError):
+        known + "1"
+
+
+def test_estimates_are_plain_floats_everywhere_else():
+    a = Estimate(3.0, 0.3)
+    assert a == 3.0 and a > 2.5 and hash(a) == hash(3.0) and type(abs(a)) is float and type(a**2) is float
+    for found in (np.ones(2) * a, a * np.ones(2), a + np.ones(2), np.ones(2) / a):
+        assert type(found) is np.ndarray and found.dtype == float
+    assert not np.isnan(a) and float(np.sqrt(a)) == np.sqrt(3.0) and complex(1, 0) * a == 3.0

@@ -90,6 +90,14 @@ def test_figures_and_table_are_saved(folders, tmp_path):
         assert (line.get_ydata() == run.coefficient("x")).all()
 
 
+def test_the_legend_of_the_forces_lies_clear_of_the_title(folders):
+    figure = compare(folders).draw()["forces"]
+    figure.canvas.draw()
+    legend, title = figure.axes[0].get_legend().get_window_extent(), figure._suptitle.get_window_extent()
+    assert not figure.legends and not legend.overlaps(title)
+    assert legend.y0 >= figure.axes[0].get_window_extent().y1
+
+
 def test_each_reference_is_drawn_once():
     line = np.linspace(0, 1, 5)
     one, other = ((line, line), (line, line**2))

@@ -199,5 +199,8 @@ def test_what_is_in_si_is_not_scaled_again_and_the_runs_own_files_stay(cylinder,
     before = own.read_bytes()
     code, _, stderr = alsph("export", cylinder.path, "-o", own)
     assert code == 2 and "a file of the run itself" in stderr and own.read_bytes() == before
-    code, _, stderr = alsph("export", cylinder.path, "-o", cylinder.path / "none" / "flow.vtkhdf")
-    assert code == 2 and "none: no such folder" in stderr
+    made = cylinder.path.parent / "made" / "of_it" / "flow.csv"  # as figures and films do
+    code, _, stderr = alsph("export", cylinder.path, "--spacing", 1, "-o", made)
+    assert code == 0 and made.is_file(), stderr
+    code, _, stderr = alsph("export", cylinder.path, "--spacing", 1, "-o", "/proc/x.csv")
+    assert code == 2 and "/proc/x.csv" in stderr and ".new" not in stderr

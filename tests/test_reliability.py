@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 from alsph.cases import Cylinder, TaylorGreen
 from alsph.config import Config, RunSettings
-from alsph.engine.simulation import Simulation, next_multiple
+from alsph.engine.simulation import Simulation
+from alsph.engine.times import next_multiple
 from alsph.errors import ConfigError, RunFolderError, SolverError, WalltimeError
 from alsph.folder import checkpoint, durable, reading
 from alsph.folder.run_folder import RunFolder

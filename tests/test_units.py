@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from alsph import config
 from alsph.analysis.averages import Estimate
-from alsph.cases import BackwardFacingStep, Cylinder, Sphere, TaylorGreen
+from alsph.cases import BackwardFacingStep, Cylinder, SettlingSphere, Sphere, TaylorGreen
 from alsph.errors import ConfigError
 from alsph.results.dimensional import dimensional
 from alsph.running.describe import describe
@@ -241,3 +241,10 @@ def test_a_parameter_of_ones_own_may_not_have_the_name_of_an_option(tmp_path, al
     (tmp_path / "odd.py").write_text(text)
     code, _, told = alsph("describe", tmp_path / "odd.py")
     assert code == 2 and "its parameter 'units_length' has the name of an option" in told
+
+
+def test_a_settling_velocity_is_in_si():
+    name = SettlingSphere.later_names[0]
+    units = Units(length=0.01, velocity=0.2, density=1000.0, kinematic_viscosity=1e-5)
+    found = dimensional({name: Estimate(0.5, 0.1)}, units, 3, 1.0, 1.0)
+    assert found == {"settling velocity over the last two diameters, m/s": pytest.approx(0.1)}

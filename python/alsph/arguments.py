@@ -1,8 +1,10 @@
-"""Numbers that functions are called with, as Python's or NumPy's: checked where they come in."""
+"""Numbers, as Python's or NumPy's, texts and paths that functions are called with: checked where they come in."""
 
 import math
 import operator
+import os
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -47,6 +49,16 @@ def ladder(name: str, values: Any) -> list[int]:
     return sorted({whole(name, value, 1) for value in values})
 
 
+def real(value: Any) -> float | None:
+    """Return a value as a number, which may be NaN or infinite; None if it is none, such as a text or an array."""
+    try:
+        if isinstance(value, str | bytes) or np.ndim(value) or np.iscomplexobj(value):
+            return None
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
 def number(name: str, value: Any, above: float | None = None, unit: str = "", *, finite: bool = False) -> float:
     """Return a number.
 
@@ -56,12 +68,36 @@ def number(name: str, value: Any, above: float | None = None, unit: str = "", *,
         If it is none, not greater than `above`, or infinite where it must be `finite`; the message begins with `name`
         and ends with `unit`.
     """
-    try:
-        found = math.nan if isinstance(value, str | bytes | bool | np.bool_) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        found = math.nan
+    given = None if isinstance(value, bool | np.bool_) else real(value)
+    found = math.nan if given is None else given
     if math.isnan(found) or (above is not None and not found > above) or (finite and math.isinf(found)):
         kind = "a finite number" if finite and math.isinf(found) else "a number"
         least = "" if above is None else " above zero" if above == 0 else f" above {above:g}"
         raise ConfigError(f"{name} = {shown(value)}: must be {kind}{least}{f' [{unit}]' if unit else ''}")
     return found
+
+
+def path_of(name: str, value: Any, what: str = "file") -> Path:
+    """Return the path of a file or folder.
+
+    Raises
+    ------
+    ConfigError
+        If it is none; the message begins with `name` and says `what` it must be the path of.
+    """
+    if isinstance(value, str | os.PathLike) and isinstance(found := os.fspath(value), str):
+        return Path(found)
+    raise ConfigError(f"{name} = {shown(value)}: must be the path of a {what}")
+
+
+def text_of(name: str, value: Any) -> str:
+    """Return a text that is not empty.
+
+    Raises
+    ------
+    ConfigError
+        If it is none; the message begins with `name`.
+    """
+    if not (isinstance(value, str) and value.strip()):
+        raise ConfigError(f"{name} = {shown(value)}: must be a text")
+    return value

@@ -15,6 +15,7 @@ from alsph import cases
 from alsph.analysis.planes import grids
 from alsph.analysis.probes import points
 from alsph.arrays import FloatArray
+from alsph.cases import answers
 from alsph.errors import ConfigError, RunFolderError
 from alsph.parameters import Parameters
 from alsph.run_settings import LATEST, UNCERTAINTY, superseded
@@ -45,7 +46,7 @@ class Config:
         """Refuse a run that cannot converge."""
         if self.converges and not self.case.is_averaged:
             told = f"{self.case.name} has no body in a stream, whose drag, lift and shedding would be averaged"
-            remedy = f"give an end time, as until = {self.case.default_until:g}"
+            remedy = f"give an end time, as until = {self.case.checked_until:g}"
             raise ConfigError(f'run.until = "converged": {told}; {remedy}')
 
     @property
@@ -63,8 +64,8 @@ class Config:
         """End time, the latest one of a run that ends when it has converged [D/U]."""
         given = self.run.until
         if given == "converged":
-            return self.run.latest or LATEST * self.case.default_until
-        return given or self.case.default_until
+            return self.run.latest or LATEST * self.case.checked_until
+        return given or self.case.checked_until
 
     @property
     def until_in_words(self) -> str:
@@ -86,7 +87,11 @@ class Config:
     @property
     def remarks(self) -> list[str]:
         """What is to be said of the case, and of where its bodies go up to an end time that is known."""
-        return [*self.case.remarks(), *([] if self.converges else self.case.remarks_until(self.until))]
+        case, until = self.case, self.until
+        found = answers.listed(case, "remarks", str, case.remarks)
+        if self.converges:
+            return found
+        return found + answers.listed(case, "remarks_until", str, lambda: case.remarks_until(until))
 
     @property
     def work(self) -> float:
@@ -164,7 +169,7 @@ class Config:
         return of_the_flow(self.case_tables())
 
     def check(self) -> None:
-        """Refuse parameters that a file cannot give back, and probes, planes and gauges that cannot be.
+        """Refuse parameters that a file cannot give back, and an end time, probes, planes and gauges that cannot be.
 
         Raises
         ------
@@ -184,7 +189,7 @@ class Config:
             odd = [name for name, value in values.items() if not isinstance(value, KEPT)] or list(table)
             told = f"{odd[0]} = {shown(values[odd[0]])}: a parameter of {kind.__name__} that its file cannot give back"
             raise ConfigError(f"{told}; use numbers, texts, true or false, and lists of them")
-        _ = self.probes, self.planes, self.gauges
+        _ = self.until, self.probes, self.planes, self.gauges
         for name in ("probe", "plane", "gauge"):
             if getattr(self.run, f"{name}_interval") and not getattr(self.run, f"{name}s"):
                 raise ConfigError(f"run.{name}_interval: there are no {name}s; say where by {name}s, or leave it out")
@@ -258,7 +263,7 @@ def _made(kind: type[Set], values: dict[str, Any], prefix: str, mistakes: list[s
     except Exception as error:  # in the user's own code
         if not (code := vars(kind).get("code")):
             raise
-        mistakes.append(f"{code.file}: {cases.source.reason(error, code.file)}")
+        mistakes.append(f"{code.file}: {answers.reason(error, code.file)}")
     return None
 
 

@@ -3,6 +3,9 @@
 Times are in units of D/U (t* = tU/D) and coefficients are dimensionless, so that frequencies are Strouhal numbers.
 """
 
+import math
+import operator
+from collections.abc import Callable, Iterable
 from typing import Any, Self
 
 import numpy as np
@@ -39,8 +42,16 @@ RATE_BATCHES = 20  # that the ± of a decay rate is found from
 HIDDEN = 3.0  # times one over their number: correlation that they do not show
 
 
+Slopes = Callable[[float, float], tuple[float, float]]
+
+
 class Estimate(float):
     """A number with its standard uncertainty; behaves as a plain float everywhere else.
+
+    Sums, differences, products and quotients with numbers and with other estimates are estimates again. Their
+    uncertainty is that of first order, with errors that are independent of each other: that of a difference of two
+    results which err alike is too large, that of ``x * x`` too small. It is NaN where one is unknown, else infinite
+    where one is. The notes of both are kept. Comparisons, powers, ``abs`` and functions of NumPy are those of floats.
 
     Attributes
     ----------
@@ -52,6 +63,7 @@ class Estimate(float):
     """
 
     __slots__ = ("note", "uncertainty")
+    __array_priority__ = -1.0  # numbers of NumPy leave the arithmetic to it, arrays do not
     uncertainty: float
     note: str
 
@@ -65,6 +77,48 @@ class Estimate(float):
     def __getnewargs__(self) -> tuple[float, float, str]:  # type: ignore[override]
         """Copy and unpickle with the uncertainty."""
         return float(self), self.uncertainty, self.note
+
+    def _with(self, other: Any, value: Callable[[float, float], float], slopes: Slopes) -> Self:
+        """Return a function of two numbers, which `slopes` says the derivatives of by each, with its uncertainty."""
+        if not isinstance(other, int | float | np.integer | np.floating):
+            return NotImplemented  # type: ignore[no-any-return]
+        a, b = float(self), float(other)
+        found = value(a, b)
+        ends = [(self, slopes(a, b)[0])] + ([(other, slopes(a, b)[1])] if isinstance(other, Estimate) else [])
+        notes = dict.fromkeys(end.note for end, _ in ends if end.note)
+        return type(self)(found, _joined([(end.uncertainty, slope) for end, slope in ends]), "; ".join(notes))
+
+    def __add__(self, other: float) -> Self:
+        """Return the sum."""
+        return self._with(other, operator.add, lambda a, b: (1.0, 1.0))
+
+    __radd__ = __add__
+
+    def __sub__(self, other: float) -> Self:
+        """Return the difference."""
+        return self._with(other, operator.sub, lambda a, b: (1.0, 1.0))
+
+    def __rsub__(self, other: float) -> Self:
+        """Return the difference."""
+        return self._with(other, lambda a, b: b - a, lambda a, b: (1.0, 1.0))
+
+    def __mul__(self, other: float) -> Self:
+        """Return the product."""
+        return self._with(other, operator.mul, lambda a, b: (b, a))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: float) -> Self:
+        """Return the quotient."""
+        return self._with(other, operator.truediv, lambda a, b: (1 / b, a / b**2))
+
+    def __rtruediv__(self, other: float) -> Self:
+        """Return the quotient."""
+        return self._with(other, lambda a, b: b / a, lambda a, b: (b / a**2, 1 / a))
+
+    def __neg__(self) -> Self:
+        """Return it with the other sign."""
+        return type(self)(-float(self), self.uncertainty, self.note)
 
     @property
     def developing(self) -> bool:
@@ -90,6 +144,12 @@ class Estimate(float):
     def __format__(self, spec: str) -> str:
         """Format the value alone when a format is given, value and uncertainty when none is."""
         return format(float(self), spec) if spec else repr(self)
+
+
+def _joined(parts: Iterable[tuple[float, float]]) -> float:
+    """Return the uncertainty of what has independent ones, each with the slope that it enters by."""
+    shares = [abs(slope) * own if np.isfinite(own) else own for own, slope in parts]
+    return math.nan if any(map(math.isnan, shares)) else math.hypot(*shares)
 
 
 def remark(value: float) -> str:

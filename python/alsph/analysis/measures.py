@@ -6,14 +6,17 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
 from alsph.analysis.averages import Estimate
 from alsph.analysis.window import DEVELOPING
+from alsph.arguments import real, text_of
 from alsph.arrays import FloatArray
+from alsph.errors import ConfigError
 from alsph.tables import html
+from alsph.text import shown
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,11 @@ class Measure:
         Largest error that passes.
     source : str
         Where the reference comes from.
+
+    Raises
+    ------
+    ConfigError
+        If name or source is no text, or one of the others no number.
     """
 
     name: str
@@ -39,6 +47,18 @@ class Measure:
     reference: float = math.nan
     tolerance: float = math.nan
     source: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no measure."""
+        text_of("the name of a measure", self.name)
+        for name in ("value", "reference", "tolerance"):
+            given = getattr(self, name)
+            if (found := real(given)) is None:
+                raise ConfigError(f"measure '{self.name}': {name} = {shown(given)}: must be a number")
+            if not isinstance(given, float):
+                object.__setattr__(self, name, found)
+        if not isinstance(self.source, str):
+            raise ConfigError(f"measure '{self.name}': source = {shown(self.source)}: must be a text")
 
     def alone(self) -> Self | None:
         """Return it without its reference, None if it is an error norm."""
@@ -56,7 +76,7 @@ class Measure:
     @property
     def error(self) -> float:
         """Deviation from the reference over its modulus; the value itself where the reference is zero."""
-        return (self.value - self.reference) / (abs(self.reference) or 1.0)
+        return (float(self.value) - float(self.reference)) / (abs(self.reference) or 1.0)
 
     @property
     def passed(self) -> bool:
@@ -100,6 +120,11 @@ class Profile:
         Arrays (m,) and (n,) of each; n = 0 where the reference is not known.
     source : str
         Where the reference comes from.
+
+    Raises
+    ------
+    ConfigError
+        If a curve is no pair of arrays of one length, or the rest no texts.
     """
 
     name: str
@@ -107,6 +132,16 @@ class Profile:
     computed: tuple[FloatArray, FloatArray]
     reference: tuple[FloatArray, FloatArray]
     source: str
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be drawn."""
+        text_of("the name of a profile", self.name)
+        if not (_is_pair(self.axes) and all(isinstance(axis, str) for axis in self.axes)):
+            raise ConfigError(f"profile '{self.name}': axes = {shown(self.axes)}: must be two texts")
+        for name in ("computed", "reference"):
+            object.__setattr__(self, name, checked_curve(f"profile '{self.name}': {name}", getattr(self, name)))
+        if not isinstance(self.source, str):
+            raise ConfigError(f"profile '{self.name}': source = {shown(self.source)}: must be a text")
 
     def alone(self) -> Self:
         """Return it without its reference."""
@@ -116,3 +151,30 @@ class Profile:
     def file_name(self) -> str:
         """Name of the file, without suffix, that its figure is saved in."""
         return "_".join(re.findall(r"\w+", re.sub(r"-(?=\d)", "minus ", self.name.lower())))
+
+
+def checked_curve(name: str, given: Any) -> tuple[FloatArray, FloatArray]:
+    """Return abscissae and ordinates (n,) of a curve.
+
+    Raises
+    ------
+    ConfigError
+        If they are none; the message begins with `name`.
+    """
+    pair = [array for each in given if (array := _numbers(each)) is not None] if _is_pair(given) else []
+    if len(pair) != 2 or len(pair[0]) != len(pair[1]):
+        raise ConfigError(f"{name} = {shown(given)}: must be two arrays of numbers, of one length")
+    return pair[0], pair[1]
+
+
+def _is_pair(value: Any) -> bool:
+    return isinstance(value, tuple | list | np.ndarray) and len(value) == 2
+
+
+def _numbers(values: Any) -> FloatArray | None:
+    """Return numbers as an array (n,); None if they are none."""
+    try:
+        array = np.asarray(values)
+        return np.asarray(array, float) if array.ndim == 1 and array.dtype.kind in "iufb" else None
+    except (TypeError, ValueError):
+        return None

@@ -15,8 +15,9 @@ import numpy as np
 
 from alsph.analysis.measures import Measure, Profile, alone
 from alsph.analysis.record import Record
+from alsph.arguments import path_of
 from alsph.arrays import Arrays, FloatArray
-from alsph.cases import remarks
+from alsph.cases import answers, remarks
 from alsph.cases.discretised import Discretised
 from alsph.cases.driven import RULES
 from alsph.cases.method import Method
@@ -128,6 +129,11 @@ class Case(Discretised):
         """Return what stands for the case in a configuration: its name, or the file of the user's that it stands in."""
         code = vars(cls).get("code")
         return code.model_dump() if code else cls.name
+
+    @property
+    def checked_until(self) -> float:
+        """What :attr:`default_until` gives, a time above zero."""
+        return answers.end_time(self, lambda: self.default_until)
 
     @property
     def thickness(self) -> float:
@@ -290,7 +296,7 @@ class Case(Discretised):
         """
         self.refuse_what_is_not_symmetric(self.rules)
         self.check_memory(threads)
-        state = self.particles()
+        state = answers.particles(self, self.particles, self.particle_spacing)
         self._warn_of_unused_velocities(state)
         self._refuse_surfaces_that_let_through(state)
         return self.problem(state)
@@ -327,7 +333,7 @@ class Case(Discretised):
         )
         normal = state["normal"][outermost]
         place = state["position"][outermost] + depth[outermost, None] * normal
-        if len(place) > 2 and (found := crossing(self.sliding, place, normal, self.default_until)):
+        if len(place) > 2 and (found := crossing(self.sliding, place, normal, self.checked_until)):
             remedy = (
                 "surfaces slide only along themselves (a body that moves has a body_motion), or it has too few points"
             )
@@ -382,7 +388,7 @@ class Case(Discretised):
         return simulation
 
     def _simulation(self, problem: Problem, threads: int | None) -> Simulation:
-        simulation = Simulation(problem, threads, until=self.default_until)
+        simulation = Simulation(problem, threads, until=self.checked_until)
         rules = self.rules
         if "inflow" in rules:
             simulation.set_inflow(rules.pop("inflow"))
@@ -437,4 +443,5 @@ class Case(Discretised):
         from alsph.running.start import run
 
         control = Control(progress, walltime=walltime, retry=retry)
-        return run(self, Path(folder), control, force=force, until=until, threads=threads, **settings)
+        place = path_of("folder", folder, "run folder")
+        return run(self, place, control, force=force, until=until, threads=threads, **settings)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from alsph.arrays import FloatArray
+from alsph.cases import answers
 from alsph.cases.driven import RULES, Driven
 from alsph.cases.method import DIFFUSION, SCHEMES, goes_with
 from alsph.engine.core import bytes_per_particle, time_step_limits
@@ -86,7 +87,7 @@ class Discretised(Driven):
             "particle_spacing": self.particle_spacing,
             "density": 1.0,
             "kinematic_viscosity": self.kinematic_viscosity,
-            "body_force": self.body_force(),
+            "body_force": answers.vector(self, "body_force", self.space_dimensions, self.body_force),
             "time_step": self.largest_time_step * self.particle_spacing,
             "domain": self.checked_domain.settings(),
             "bodies": [body.settings() | self._ruled(body) for body in self.checked_bodies],

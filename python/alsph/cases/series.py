@@ -15,7 +15,7 @@ from alsph.analysis.record import Record
 from alsph.arrays import FloatArray
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError
-from alsph.text import printable
+from alsph.text import printable, shown
 
 
 class Series(ABC):
@@ -59,12 +59,18 @@ class Series(ABC):
 
     def record(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> None:
         """Keep them."""
-        row = [*map(_digits, (simulation.time, *self.values(simulation)))]
+        given: Any = self.values(simulation)
+        try:
+            numbers = np.asarray(given)
+            wrong = numbers.ndim != 1 or numbers.dtype.kind not in "iufb"
+        except ValueError:
+            wrong = True
+        if wrong:
+            raise ConfigError(f"output {self.file}: values() gave {shown(given)}: must return an array (m,) of numbers")
+        row = [*map(_digits, (simulation.time, *numbers))]
         if len(row) != len(self.columns):
-            numbers, names = len(row) - 1, len(self.columns) - 1
-            raise ConfigError(
-                f"output {self.file}: values() gave {numbers} numbers for {names} columns beside the time"
-            )
+            count, names = len(row) - 1, len(self.columns) - 1
+            raise ConfigError(f"output {self.file}: values() gave {count} numbers for {names} columns beside the time")
         self.rows.append(row)
 
     def append(self, path: Path) -> None:

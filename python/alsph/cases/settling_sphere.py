@@ -52,7 +52,7 @@ class SettlingSphere(Case):
     picture_axis: ClassVar[str] = "y"
     velocity_max: ClassVar[float] = 1.5
     later_names: ClassVar[tuple[str, ...]] = (
-        "settling velocity over the last two diameters",
+        "settling velocity over the last two diameters, U",
         "Reynolds number of the sphere",
         DRAG,
         "velocity of the sphere",
@@ -165,7 +165,7 @@ class SettlingSphere(Case):
         known = reference.table("sphere_drag.csv")
         expected = float(np.interp(own, *known)) if known[0][0] <= own <= known[0][-1] else math.nan
         found = [
-            Measure("settling velocity over the last two diameters", velocity),
+            Measure("settling velocity over the last two diameters, U", velocity),
             Measure("Reynolds number of the sphere", own),
             Measure(DRAG, drag, expected, 0.05, "Johnson and Patel (1999), a sphere far from all walls"),
         ]

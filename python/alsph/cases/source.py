@@ -7,13 +7,13 @@ import linecache
 import os
 import re
 import sys
-import traceback
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Self
 
 from pydantic import Field, model_validator
 
+from alsph.cases.answers import reason
 from alsph.cases.base import Case, name_of, title_of
 from alsph.errors import ConfigError
 from alsph.parameters import Parameters, suggest
@@ -168,14 +168,3 @@ def _complete(model: type[Case], source: Source) -> None:
         raise ValueError(f"title = {model.title!r} of {model.__name__}: must be a text")
     model.model_rebuild()
     model.code = source
-
-
-def reason(error: BaseException, file: str) -> str:
-    """Say where in a file what went wrong."""
-    if isinstance(error, SyntaxError):
-        return f"line {error.lineno}: {error.msg}"
-    alone = f"; a run holds {file} alone, put it into that, install it, or set PYTHONPATH to where it is"
-    hint = alone if isinstance(error, ModuleNotFoundError) else ""
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
-    where, first = f"line {lines[-1]}: " if lines else "", str(error).partition("\n")[0]
-    return f"{where}{type(error).__name__}: {first}{hint}"

@@ -64,7 +64,7 @@ def _case_command(model: type[cases.Case], action: Callable[..., None]) -> Calla
         )
     try:
         case = model()
-        until, hidden = f"{case.default_until:g}", idle(model, case)
+        until, hidden = f"{case.checked_until:g}", idle(model, case)
     except Exception:  # parameters that must be given
         until, hidden = OWN_DEFAULT, idle(model, None)
 

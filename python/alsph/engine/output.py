@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from numpy.typing import NDArray
 
 from alsph.engine.simulation import Simulation
 
 
+@runtime_checkable
 class Output(Protocol):
     """A file of a run folder that grows as the run does.
 

@@ -4,7 +4,6 @@ import json
 import math
 import os
 import threading
-import time as clock
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -21,6 +20,7 @@ from alsph.engine.core import TYPES, exact, translated
 from alsph.engine.motion import answering_poses, is_rigid
 from alsph.engine.prescribed import Prescription, Rule, answering, asked, backflow
 from alsph.engine.problem import Problem
+from alsph.engine.times import next_multiple, slices
 from alsph.errors import ConfigError, SharedError, SolverError
 from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Kind
@@ -28,9 +28,6 @@ from alsph.text import shown
 
 AS_IT_IS: Any = object()
 """Stands for a rule that is not named."""
-
-SLICE_SECONDS = 0.2
-"""Longest time in the engine without a look at signals, so that Ctrl-C works."""
 
 
 class Simulation:
@@ -67,12 +64,15 @@ class Simulation:
     """
 
     def __init__(self, problem: Problem, threads: int | None = None, until: float = math.inf) -> None:
+        if not isinstance(problem, Problem):
+            raise ConfigError(f"problem = {shown(problem)}: must be what `case.build()` returns")
         self.problem = problem
-        self.until = until
+        self.until = number("until", until)
         self.rules: dict[str, Rule] = {}
         self.prescribed: dict[str, Prescription] = {}
         self.backflow = ""
         self._history: list[Arrays] = []
+        self._lent_to = ""
         self._start(problem.state, threads)
 
     def _start(self, state: dict[str, Any], threads: int | None) -> None:
@@ -114,6 +114,22 @@ class Simulation:
         finally:
             self._user.release()
 
+    @contextmanager
+    def lent(self, whom: str) -> Iterator[None]:
+        """Let no one step or change the simulation meanwhile, because it is read by `whom`."""
+        self._lent_to = whom
+        try:
+            yield
+        finally:
+            self._lent_to = ""
+
+    def _refuse_changes(self) -> None:
+        if self._lent_to:
+            raise SharedError(
+                f"{self._lent_to}: it steps or changes the simulation of the run; it may read it alone, by `sample`, "
+                "`snapshot`, `state` and the like"
+            )
+
     def __repr__(self) -> str:
         """Name the time, the step and the particles."""
         if os.getpid() != self._process:
@@ -154,9 +170,10 @@ class Simulation:
             If the computation breaks down.
         """
         steps = whole("steps", steps, 0)
+        self._refuse_changes()
         with self._engine() as engine:
             first = engine.step
-            for seconds in _slices(wall_seconds):
+            for seconds in slices(wall_seconds):
                 left = first + steps - engine.step
                 if left <= 0:
                     break
@@ -174,8 +191,9 @@ class Simulation:
             If the computation breaks down.
         """
         time = number("time", time)
+        self._refuse_changes()
         with self._engine() as engine:
-            for seconds in _slices(wall_seconds):
+            for seconds in slices(wall_seconds):
                 if engine.time >= time:
                     break
                 if self._prescribe(2) == 1:
@@ -293,6 +311,7 @@ class Simulation:
         ConfigError
             If it is no such array, or more fluid would leave through an inlet than enter.
         """
+        self._refuse_changes()
         if callable(velocity):
             self._tell("inflow", velocity)
         else:
@@ -336,6 +355,7 @@ class Simulation:
         :meth:`~alsph.cases.driven.Driven.sliding`. They are called in a thread of the engine, and cannot use the
         simulation.
         """
+        self._refuse_changes()
         given = {"forcing": forcing, "sliding": sliding, "motion": motion}
         for name, rule in given.items():
             if not (rule is None or rule is AS_IT_IS or callable(rule)):
@@ -413,22 +433,9 @@ class Simulation:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go back to a state that :meth:`state` has returned; the history starts anew."""
+        self._refuse_changes()
         self._start(state, self.threads)
         self._history = []
         if "inflow" in self.rules:
             self.set_inflow(self.rules["inflow"])
         self.prescribe(**{name: self.rules.get(name) for name in ("forcing", "sliding", "motion")})
-
-
-def next_multiple(time: float, interval: float) -> float:
-    """Return the smallest multiple of `interval` after `time`, the same one for each time up to it, to the last bit."""
-    count = math.floor(min(time / interval, 1e300))
-    multiples = ((count + k) * interval for k in range(3))
-    return next((multiple for multiple in multiples if multiple > time), math.nextafter(time, math.inf))
-
-
-def _slices(wall_seconds: float) -> Iterator[float]:
-    """Yield the lengths of short slices of `wall_seconds` until they have passed."""
-    end = clock.monotonic() + number("wall_seconds", wall_seconds)
-    while (left := end - clock.monotonic()) > 0:
-        yield min(left, SLICE_SECONDS)

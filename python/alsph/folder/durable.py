@@ -31,16 +31,21 @@ MAGIC = b"alsph journal 1\n"
 def replacing(path: Path, keep: Path | None = None) -> Iterator[Path]:
     """Give a temporary path and, once its file is safe on the disk, rename it to `path`; `keep` gets what was there."""
     temporary = path.with_name(f".{path.name}.new")
-    temporary.unlink(missing_ok=True)
     try:
+        temporary.unlink(missing_ok=True)
         yield temporary
         flush(temporary)
         if keep and path.exists():
             path.replace(keep)
         temporary.replace(path)
         flush(path.parent)
+    except OSError as error:
+        if error.filename is not None and os.fspath(error.filename) == str(temporary):
+            error.filename = str(path)  # the name that whoever asked for it knows
+        raise
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def is_plain(path: Path, *kinds: Callable[[int], bool]) -> bool:

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alsph.analysis.loads import PressureCoefficient
-from alsph.analysis.measures import Profile
+from alsph.analysis.measures import Profile, checked_curve
 from alsph.analysis.probes import GaugeRecord, Probes
 from alsph.analysis.window import DEVELOPING
 from alsph.arrays import AXES, FloatArray
 from alsph.geometry.surface import Surface
-from alsph.plotting.style import MARKERS, PALETTE, TIME_LABEL, blank, line
+from alsph.plotting.style import MARKERS, PALETTE, TIME_LABEL, blank, line, nothing_to_draw
 from alsph.text import in_figure
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ def pressure_coefficient(
     names : sequence of str, optional
         Name of the body that each closed curve is of.
     """
+    reference = None if reference is None else checked_curve("reference", reference)
     if coefficient.surface and coefficient.surface.chord is not None:
         return _pressure_over_chord(coefficient, coefficient.surface, coefficient.surface.chord, reference, names)
     figure = blank(7, 4.5)
@@ -137,6 +138,11 @@ def profile(curves: dict[str, Profile]) -> Figure:
 
 def gauges(record: GaugeRecord) -> Figure:
     """Draw the depth of the water over time, of ten gauges where there are more."""
+    if not len(record.position):
+        figure = blank(7, 4.5)
+        figure.subplots().set(xlabel=TIME_LABEL, ylabel="depth over $D$")
+        nothing_to_draw(figure, "no gauges")
+        return figure
     shown, told = _some(record.position)
     nothing = (np.empty(0), np.empty(0))
     return profile(
@@ -168,6 +174,9 @@ def probes(record: Probes) -> Figure:
         axes.grid(alpha=0.3)
     grid[0].set_title(f"at the probes{told}", loc="left", fontsize="medium")
     grid[-1].set_xlabel(TIME_LABEL)
+    if not shown:
+        nothing_to_draw(figure, "no probes")
+        return figure
     figure.legend(*grid[0].get_legend_handles_labels(), loc="outside right upper", fontsize="small", frameon=False)
     return figure
 

@@ -12,7 +12,7 @@ from alsph.analysis.averages import Window
 from alsph.analysis.energy import taken
 from alsph.analysis.window import DEVELOPING
 from alsph.arrays import FloatArray
-from alsph.plotting.style import PALETTE, TIME_LABEL, blank, line
+from alsph.plotting.style import PALETTE, TIME_LABEL, blank, line, nothing_to_draw
 from alsph.results.ledger import Ledger
 from alsph.results.outcome import has_moved, has_surface
 from alsph.results.run import Run
@@ -59,6 +59,8 @@ def forces(run: Run, body: str | None = None) -> Figure:
     if (share := run.config.case.computed_share) < 1:
         lower.set_title(f"of {Fraction(share)} of the body, which is computed", loc="right", fontsize="medium")
     lower.set_xlabel(TIME_LABEL)
+    if not run.bodies:
+        nothing_to_draw(figure, "no body whose forces are recorded")
     return figure
 
 
@@ -92,9 +94,7 @@ def coefficients(runs: dict[str, Run]) -> Figure:
             axes.set_ylim(limits)
         axes.set_ylabel(f"${symbol}$")
         axes.grid(alpha=0.3)
-    figure.legend(
-        *upper.get_legend_handles_labels(), loc="outside upper right", ncols=4, fontsize="small", frameon=False
-    )
+    upper.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=3, fontsize="small", frameon=False)
     lower.set_xlabel(TIME_LABEL)
     return figure
 
@@ -116,7 +116,7 @@ def spectrum(runs: dict[str, Run], body: str | None = None) -> Figure:
     for axes, axis, symbol in zip(grid, "xy", ("C_D", "C_L"), strict=True):
         for number, (name, run) in enumerate(runs.items()):
             time, window, coefficient = run.history["time"], run.window, run.coefficient(axis, body=body)
-            if window.edges.size:
+            if window.edges.size and np.isfinite(coefficient).any():
                 lines = averages.amplitude_spectrum(time, coefficient, window.start, window.end)
                 label = f"{name}, {DEVELOPING}" if window.developing else name
                 drawn = line(number, len(runs), len(lines[0]) - 1, logarithmic=True)
@@ -128,6 +128,9 @@ def spectrum(runs: dict[str, Run], body: str | None = None) -> Figure:
         if axes.lines:
             axes.legend()
     grid[-1].set_xlabel("$fD/U$")
+    if not any(axes.lines for axes in grid):
+        some = any(run.bodies for run in runs.values())
+        nothing_to_draw(figure, "no averaging window" if some else "no body whose forces are recorded")
     return figure
 
 

@@ -14,7 +14,7 @@ from alsph.analysis.vortices import DERIVED
 from alsph.arguments import number
 from alsph.arrays import AXES, FloatArray
 from alsph.errors import ConfigError
-from alsph.geometry.particles import Kind, Snapshot
+from alsph.geometry.particles import Kind, Snapshot, check_part
 from alsph.geometry.plane import Plane
 from alsph.parameters import suggest
 from alsph.plotting.style import TIME_LABEL, blank
@@ -267,6 +267,8 @@ def extent_of(
             left = right = bottom = top = np.nan
         if not (0 < right - left < LARGEST_VIEW * spacing and 0 < top - bottom < LARGEST_VIEW * spacing):
             raise ConfigError(f"view = {shown(view)}: needs left, right, bottom and top, in this order [D]")
+        axes = list(plane.across) if plane else [0, 1]
+        check_part(f"view = {shown(view)}", snapshot, (left, bottom), (right, top), axes)
         return left, right, bottom, top
     axes = plane.across if plane else [0, 1]
     position = snapshot.position[snapshot.kind == Kind.FLUID][:, axes]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from alsph.arguments import path_of
 from alsph.errors import ConfigError
 from alsph.folder.durable import check_target, replacing
 from alsph.parameters import suggest
@@ -61,6 +62,12 @@ def blank(width: float, height: float, layout: Literal["constrained", "compresse
     return Picture(figsize=(width, height), layout=layout)
 
 
+def nothing_to_draw(figure: Figure, why: str) -> None:
+    """Say in each panel of a figure why it is empty."""
+    for axes in figure.axes:
+        axes.text(0.5, 0.5, why, ha="center", transform=axes.transAxes)
+
+
 def save(figure: Figure, path: str | Path, **options: Any) -> None:
     """Save a figure in a file, whose folder is made; what was there is replaced, nothing is written through a link.
 
@@ -79,7 +86,7 @@ def save(figure: Figure, path: str | Path, **options: Any) -> None:
     RunFolderError
         If the file is a link or a special file.
     """
-    path = Path(path)
+    path = path_of("path", path)
     path = path if path.suffix else path.with_suffix(".png")
     known = figure.canvas.get_supported_filetypes()
     if (kind := path.suffix[1:].lower()) not in known:

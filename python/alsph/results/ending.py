@@ -9,7 +9,7 @@ from alsph.analysis.averages import Estimate
 from alsph.analysis.record import Record
 from alsph.analysis.window import Window
 from alsph.config import Config
-from alsph.engine.simulation import next_multiple
+from alsph.engine.times import next_multiple
 from alsph.results.outcome import unsettled
 
 LIFT_SHARE = 10 / 3
@@ -85,8 +85,8 @@ def judge(run: Record, config: Config) -> Judgement:
     """
     window, time, latest = run.window, float(run.history["time"][-1]), config.until
     missing = [remark.partition(";")[0] for remark in unsettled(window, LEAST_PERIODS)]
-    if not window.periods and time < config.case.default_until:
-        missing.append(f"shedding, which may begin until tU/D = {config.case.default_until:g}")
+    if not window.periods and time < config.case.checked_until:
+        missing.append(f"shedding, which may begin until tU/D = {config.case.checked_until:g}")
     for name, value in run.averaged.items():
         missing += _above(name, value, config.uncertainty * (LIFT_SHARE if name == "C_L'" else 1.0))
     reasons = {

@@ -16,7 +16,7 @@ import numpy as np
 from alsph.analysis import sampling
 from alsph.analysis.probes import Probes
 from alsph.analysis.vortices import DERIVED, vorticity
-from alsph.arguments import number
+from alsph.arguments import number, path_of
 from alsph.arrays import AXES, FloatArray
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import vtkhdf
@@ -149,7 +149,7 @@ class Grid(InUnits):
         RunFolderError
             If the file is a link or a special file.
         """
-        path = Path(path)
+        path = path_of("path", path)
         write = {
             ".vtkhdf": self._write_image,
             ".vti": self._write_xml_image,
@@ -302,7 +302,7 @@ def save_probes(found: Probes, path: str | Path, units: Units | None = None) -> 
     RunFolderError
         If the file is a link or a special file.
     """
-    path = Path(path)
+    path = path_of("path", path)
     if path.suffix != ".csv":
         raise ConfigError(f"{path}: what probes recorded is written to a file that ends in .csv")
     if not len(found.time):
@@ -318,9 +318,8 @@ def save_probes(found: Probes, path: str | Path, units: Units | None = None) -> 
 
 
 def _check(path: Path) -> None:
-    """Refuse a file that cannot be written, or that a run needs."""
-    if not path.parent.is_dir():
-        raise RunFolderError(f"{path.parent}: no such folder")
+    """Make the folder of a file, which cannot be one that a run needs."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     own = OWN.fullmatch(path.name) or (path.name.startswith("output_") and path.exists())
     if (path.parent / "run.json").is_file() and own and not EXPORTED.fullmatch(path.name):
         raise RunFolderError(f"{path}: a file of the run itself; choose another name")
@@ -381,8 +380,7 @@ def grid(
     """Return the fields of a snapshot on a regular grid; see :meth:`alsph.Run.to_grid`."""
     spacing = own_spacing if spacing is None else number("spacing", spacing, above=0, unit="D", finite=True)
     lower, upper = box
-    for name in derived:
-        choose("field", name, DERIVED)
+    check_derived(derived)
     counts = cell_counts(lower, upper, spacing)
     if counts.prod() > MOST_POINTS:
         raise ConfigError(f"spacing = {spacing:g}: more than {MOST_POINTS:,} points; use a larger one or a smaller box")
@@ -400,10 +398,23 @@ def grid(
     return Grid(snapshot.time, axes, shaped, symbols)
 
 
-def cloud(snapshot: Snapshot, spacing: float, derived: Sequence[str] = ()) -> pyvista.PolyData:
-    """Return the particles of a snapshot; see :meth:`alsph.Run.to_pyvista`."""
+def check_derived(derived: Sequence[str]) -> None:
+    """Refuse fields that are not known.
+
+    Raises
+    ------
+    ConfigError
+        If there are some, or `derived` is no list of them.
+    """
+    if isinstance(derived, str) or not isinstance(derived, Iterable):
+        raise ConfigError(f"derived = {shown(derived)}: must be a list of fields, such as ['q_criterion']")
     for name in derived:
         choose("field", name, DERIVED)
+
+
+def cloud(snapshot: Snapshot, spacing: float, derived: Sequence[str] = ()) -> pyvista.PolyData:
+    """Return the particles of a snapshot; see :meth:`alsph.Run.to_pyvista`."""
+    check_derived(derived)
     points = vtkhdf.three_components(snapshot.position)
     found: pyvista.PolyData = _library("pyvista", "3d").PolyData(points)
     found["velocity"] = vtkhdf.three_components(snapshot.velocity)

@@ -20,7 +20,7 @@ from alsph.arrays import AXES, FloatArray
 from alsph.config import Config, of_run
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
-from alsph.geometry.particles import Snapshot
+from alsph.geometry.particles import Snapshot, check_part
 from alsph.geometry.points import checked_box, checked_points
 from alsph.results import export
 from alsph.results.export import Grid, PlaneRecord
@@ -214,7 +214,9 @@ class Fields:
         domain = self.config.case.checked_domain
         corners = domain.lower if lower is None else lower, domain.upper if upper is None else upper
         box = checked_box(*corners, domain.dimensions)
-        return export.grid(self.snapshot(time), self.spacing, spacing, box, domain, derived, self.symbols)
+        snapshot, axes = self.snapshot(time), range(domain.dimensions)
+        check_part(f"box from {box[0].tolist()} to {box[1].tolist()}", snapshot, *box, axes)
+        return export.grid(snapshot, self.spacing, spacing, box, domain, derived, self.symbols)
 
     def to_xarray(
         self,

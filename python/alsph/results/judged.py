@@ -2,17 +2,38 @@
 
 from __future__ import annotations
 
-from typing import Any
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
 
-from alsph.analysis.measures import Measure, alone
+from alsph.analysis.measures import Measure, Profile, alone
 from alsph.analysis.record import Record
-from alsph.cases.base import Case
+from alsph.cases import answers
 from alsph.cases.method import Method
-from alsph.cases.source import reason
 from alsph.config import Config
+from alsph.errors import AlsphError, ConfigError
 from alsph.geometry.particles import Snapshot
 from alsph.results.outcome import changes
+from alsph.run_settings import RunSettings
 from alsph.text import shown
+
+Judged = TypeVar("Judged", Measure, Profile)
+
+OWN_NAMES = frozenset(
+    (
+        *("case", "status", "message", "time", "steps", "seconds", "folder", "remarks", "units"),
+        *("Reynolds number", "resolution, D/Δx", "computing time", "time reached, tU/D", "iterations of a step"),
+        *("averaged from tU/D", "averaged to tU/D", "averaging rule", "shedding periods"),
+        *("share of the body that is computed", "artificial Mach number", "artificial Mach number of the penalty"),
+        *("mean velocity divergence, |∇·u| D/U", "largest velocity divergence, |∇·u| D/U"),
+        *("sum of the velocity divergence, Σ|∇·u| D/U", "mean time step, ΔtU/Δx", "mean iterations"),
+    )
+)
+"""What results of a run, and the row of one in a study, have of their own beside parameters and settings."""
+
+NUMBERED = re.compile(r"remark \d+")
+"""The same of remarks."""
 
 ELSEWHERE = "no reference: it is of the flow from the case's own start on, and this run goes on with another's"
 """The remark on a run that an initial run takes its reference."""
@@ -34,21 +55,62 @@ class _Until:
 
 def judged(run: Record, config: Config) -> tuple[list[Measure], list[str]]:
     """Return the measures of a run, and what went wrong with them in code of the user's."""
-    case = config.case
-    try:
-        found = case.measures(run)
-        if odd := [measure for measure in found if not isinstance(measure, Measure)]:
-            raise TypeError(f"{shown(odd[0])} is no Measure")
+
+    def found() -> list[Measure]:
+        measures = _measures(run, config)
+        _check_names(measures, config)
         if stands_alone(run, config):
-            found = alone(found)
-        elif case.is_steady:
-            found = _settled(found, case, run)
-    except Exception as error:
-        if type(case).__module__.startswith("alsph."):
+            return alone(measures)
+        return _settled(measures, run, config) if config.case.is_steady else measures
+
+    return _told("measures", config, found)
+
+
+def drawn(run: Record, config: Config) -> tuple[list[Profile], list[str]]:
+    """Return the profiles of a run, and what went wrong with them in code of the user's."""
+    case = config.case
+
+    def found() -> list[Profile]:
+        profiles = answers.listed(case, "profiles", Profile, lambda: case.profiles(run))
+        if case.no_reference or stands_alone(run, config):
+            return [profile.alone() for profile in profiles]
+        return profiles
+
+    return _told("profiles", config, found)
+
+
+def _told(what: str, config: Config, ask: Callable[[], list[Judged]]) -> tuple[list[Judged], list[str]]:
+    """Return what is found, or why code of the user's finds nothing."""
+    case = config.case
+    name = f"{type(case).__name__}.{what}()"
+    try:
+        with answers.told(name, case):
+            return ask(), []
+    except AlsphError as error:
+        if not answers.is_own(case):
             raise
-        what = reason(error, case.code.file if case.code else "<cell>")
-        return [], [f"no measures: those of {type(case).__name__} fail, {what}; correct the file that defines it"]
-    return found, []
+        why = str(error) if str(error).startswith(name) else f"{name} fails, {error}"
+        return [], [f"no {what}: {why}; correct the file that defines it"]
+
+
+def _measures(run: Record, config: Config) -> list[Measure]:
+    case = config.case
+    return answers.listed(case, "measures", Measure, lambda: case.measures(run))
+
+
+def _check_names(measures: Iterable[Measure], config: Config) -> None:
+    """Refuse measures that would take each other's place among the results, or that of one which is there anyway."""
+    case = config.case
+    taken = OWN_NAMES | {case.symbols(name) for name in OWN_NAMES}
+    taken |= {*case.parameter_names(), *RunSettings.model_fields}
+    counts = Counter(measure.name for measure in measures)
+    counts.update(f"{measure.name}, reference" for measure in measures if abs(measure.reference) > 0)
+    for name, count in counts.items():
+        if count > 1:
+            raise ConfigError(f"{type(case).__name__}.measures() has {count} of the name {shown(name)}")
+        if name in taken or NUMBERED.fullmatch(name):
+            told = "results of a run, or rows of a study, have something of that name"
+            raise ConfigError(f"{type(case).__name__}.measures(): {shown(name)}: {told}; give it another one")
 
 
 def stands_alone(run: Record, config: Config) -> bool:
@@ -63,7 +125,7 @@ def goes_on_elsewhere(run: Record, config: Config) -> bool:
     return config.case.from_start and bool(begun)
 
 
-def _settled(found: list[Measure], case: Case, run: Record) -> list[Measure]:
+def _settled(found: list[Measure], run: Record, config: Config) -> list[Measure]:
     """Return measures of a steady flow with a note on those that are another than a quarter of the run before."""
-    before = {measure.name: measure for measure in case.measures(_Until(run, 0.75))}
+    before = {measure.name: measure for measure in _measures(_Until(run, 0.75), config)}
     return [measure.settling(before[measure.name]) if measure.name in before else measure for measure in found]

@@ -140,7 +140,7 @@ class Loads(Fields):
         point = case.moment_point if about is None else checked_point("about", about)
         centres = {each.name: each.center for each in case.checked_bodies}
         missing = np.full(len(self.history["time"]), np.nan)
-        moment = np.zeros_like(missing)
+        moment = np.zeros_like(missing) if names else missing
         for name in names:
             for each in parts:
                 moment += self.history.get(f"{name}_{each}_torque", missing)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import shlex
 from collections.abc import Callable
 from functools import cached_property
@@ -16,8 +15,10 @@ import numpy as np
 from alsph.analysis.averages import Estimate
 from alsph.analysis.measures import Measure, Measures, Profile
 from alsph.analysis.probes import GaugeRecord
+from alsph.arguments import path_of
 from alsph.arrays import FloatArray
 from alsph.cases import remarks
+from alsph.cases.answers import is_own
 from alsph.cases.free_surface import Gauges
 from alsph.cases.source import shown_name
 from alsph.errors import ConfigError, RunFolderError
@@ -29,7 +30,7 @@ from alsph.geometry.plane import Plane
 from alsph.parameters import choose
 from alsph.results.dimensional import dimensional
 from alsph.results.export import Grid
-from alsph.results.judged import ELSEWHERE, goes_on_elsewhere, judged, stands_alone
+from alsph.results.judged import ELSEWHERE, drawn, goes_on_elsewhere, judged
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.loads import Loads
 from alsph.results.outcome import ended_early, made, outcome, unsolved
@@ -64,9 +65,7 @@ class Run(Loads):
     """
 
     def __init__(self, path: str | Path) -> None:
-        if not isinstance(path, str | os.PathLike):
-            raise ConfigError(f"run = {shown(path)}: must be the path of a run folder")
-        self.path = Path(path)
+        self.path = path_of("run", path, "run folder")
         if not self.path.is_dir():
             there = "a file, and no run folder" if self.path.exists() else "no such run folder"
             raise RunFolderError(f"{self.path}: {there}")
@@ -102,7 +101,6 @@ class Run(Loads):
 
     @cached_property
     def _judged(self) -> tuple[list[Measure], list[str]]:
-        """The measures, and what went wrong with them in code of the user's."""
         return judged(self, self.config)
 
     @cached_property
@@ -118,10 +116,12 @@ class Run(Loads):
 
     @cached_property
     def profiles(self) -> list[Profile]:
-        """Curves of the run beside their reference curves."""
-        found, case = self.config.case.profiles(self), self.config.case
-        alone = case.no_reference or stands_alone(self, self.config)
-        return [profile.alone() for profile in found] if alone else found
+        """Curves of the run beside their reference curves; none if the case's own code fails."""
+        return self._drawn[0]
+
+    @cached_property
+    def _drawn(self) -> tuple[list[Profile], list[str]]:
+        return drawn(self, self.config)
 
     @cached_property
     def ledger(self) -> Ledger:
@@ -142,6 +142,7 @@ class Run(Loads):
             *(ended_early(self) if case.residual_tolerance and case.solver == "jacobi" else []),
             *made(self.measures),
             *self._judged[1],
+            *(self._drawn[1] if is_own(case) else []),
             *([ELSEWHERE] if goes_on_elsewhere(self, self.config) else []),
             *self.config.remarks,
         ]
@@ -153,9 +154,7 @@ class Run(Loads):
         return self.config.case.units
 
     def dimensional(self, units: Units | None = None) -> dict[str, Estimate]:
-        """Return the main results that have a dimension in SI, by their names with the unit, as ``mean drag, N/m``.
-
-        Forces are those on the whole body, of which a quarter may be computed.
+        """Return the main results with a dimension in SI, named with the unit; forces are those on the whole body.
 
         Parameters
         ----------
@@ -388,6 +387,8 @@ class Run(Loads):
         if isinstance(profile, str):
             choose("profile", profile, named := {each.name: each for each in self.profiles})
             profile = named[profile]
+        elif not isinstance(profile, Profile):
+            raise ConfigError(f"profile = {shown(profile)}: must be one of run.profiles, or its name")
         return self._saved(_plotting().profile({"computed": profile}), path)
 
     def plot_gauges(self, path: str | Path | None = None) -> Figure:

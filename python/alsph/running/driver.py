@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from alsph.config import Config
-from alsph.engine.simulation import SLICE_SECONDS, Simulation, next_multiple
+from alsph.engine.simulation import Simulation
+from alsph.engine.times import SLICE_SECONDS, next_multiple
 from alsph.errors import AlsphError, Interrupted, SolverError, WalltimeError
 from alsph.folder import checkpoint
 from alsph.folder.reading import History
@@ -20,7 +21,7 @@ from alsph.results.ending import judge, next_judgement
 from alsph.results.run import Run
 from alsph.running import beginning
 from alsph.running.control import Control, interruptible
-from alsph.running.outputs import outputs_of, remarks_of
+from alsph.running.outputs import outputs_of, record, remarks_of
 from alsph.running.progress import Reporter
 from alsph.running.provenance import describe, peak_memory, provenance
 from alsph.text import duration
@@ -49,6 +50,7 @@ class Driver:
         self.time_step = math.inf
         self.pause = 0.0
         self._go_on_with(config, simulation)
+        self.remarks = remarks_of(config, simulation.state())
         if self.start is not None and simulation.step == 0:
             self.start["state_sha256"] = self.saved["state_sha256"]
 
@@ -75,12 +77,11 @@ class Driver:
         self.deadline = control.deadline
         verb = "resumed" if self.simulation.step else "started"
         self.folder.log(f"{verb} at {self.where}: {describe(self.provenance)}")
-        remarks = remarks_of(self.config, self.simulation.state())
-        for remark in remarks:
+        for remark in self.remarks:
             self.folder.log(f"remark: {remark}")
         at_most = self.config.converges
         with Reporter(self.config.until, self.simulation.time, at_most=at_most, enabled=control.progress) as reporter:
-            for remark in remarks:
+            for remark in self.remarks:
                 reporter.say(f"remark: {remark}")
             try:
                 with interruptible(control.stop) as signals:
@@ -143,7 +144,7 @@ class Driver:
         for number, output in enumerate(self.outputs):
             if time >= self.due[number]:
                 self.due[number] = next_multiple(time, output.interval)
-                output.record(self.simulation, rows)
+                record(output, self.simulation, rows)
         if time >= self.next_output or self._over:
             self.next_output = next_multiple(time, self.config.run.output_interval)
             self._output()

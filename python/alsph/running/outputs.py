@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from alsph.analysis.sampling import in_solid
 from alsph.arrays import FloatArray
+from alsph.cases import answers
 from alsph.cases.base import Case
 from alsph.cases.free_surface import Gauges
 from alsph.config import Config
@@ -149,7 +150,7 @@ def outputs_of(config: Config) -> list[Output]:
     ConfigError
         If an output of the case has a name or an interval that cannot be, or a probe or plane is not in the domain.
     """
-    own = config.case.outputs()
+    own = answers.listed(config.case, "outputs", Output, config.case.outputs)
     for output in own:
         if not (isinstance(output.file, str) and re.fullmatch(r"output_\w+\.\w+", output.file)):
             raise ConfigError(
@@ -161,6 +162,19 @@ def outputs_of(config: Config) -> list[Output]:
         if count > 1:
             raise ConfigError(f"case '{config.case.name}': {count} outputs have the file {name}; one file, one output")
     return [*_samples_of(config), *_gauges_of(config), *own]
+
+
+def record(output: Output, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> None:
+    """Let an output keep what is to be known of the simulation, which it leaves as it is.
+
+    Raises
+    ------
+    AlsphError
+        If it fails, or would step or change the simulation: it names the output.
+    """
+    what = f"output {output.file}"
+    with answers.told(f"{what}: {type(output).__name__}", output), simulation.lent(what):
+        output.record(simulation, rows)
 
 
 def _gauges_of(config: Config) -> Iterator[Gauges]:

@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from alsph import config
+from alsph.arguments import path_of
 from alsph.config import Config
 from alsph.engine.prescribed import WORDS, difference
-from alsph.engine.simulation import SLICE_SECONDS, Simulation
+from alsph.engine.simulation import Simulation
+from alsph.engine.times import SLICE_SECONDS
 from alsph.errors import ConfigError, DamagedError, RunFolderError
 from alsph.folder import checkpoint
 from alsph.folder.history import UNKNOWN, flatten, lines
@@ -78,7 +80,7 @@ def repeat(path: str | Path, threads: int | None = None, *, progress: bool = Tru
     SolverError
         If the computation breaks down, which it did not in the run.
     """
-    folder = RunFolder(Path(path))
+    folder = RunFolder(path_of("run", path, "run folder"))
     info, settings = folder.info(), config.of_run(folder.path).run
     if not info.get("segments") or not info.get("checkpoint"):
         raise RunFolderError(f"{path}/run.json does not tell with what steps the run was made; it is of an older alsph")

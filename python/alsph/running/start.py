@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from alsph import config
+from alsph.arguments import path_of
 from alsph.arrays import size_of
 from alsph.cases.base import Case
 from alsph.config import Config, of_run, of_the_flow
@@ -112,7 +113,9 @@ def resume(
     SolverError, WalltimeError, Interrupted
         As :meth:`alsph.cases.Case.run`.
     """
-    return _resume(RunFolder(Path(path)), until, threads, Control(progress, walltime=walltime, retry=retry))
+    return _resume(
+        RunFolder(path_of("run", path, "run folder")), until, threads, Control(progress, walltime=walltime, retry=retry)
+    )
 
 
 def _resume(folder: RunFolder, until: float | Converged | None, threads: int | None, control: Control) -> Run:

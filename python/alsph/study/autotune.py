@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from alsph.arguments import number
+from alsph.arguments import number, path_of
 from alsph.cases import Case
 from alsph.config import Config
 from alsph.errors import ConfigError, SolverError
 from alsph.folder.durable import write_text
 from alsph.tables import markdown
-from alsph.text import duration
+from alsph.text import duration, shown
 
 RUNGS = 2**0.5
 """Ratio of the time steps of the ladder."""
@@ -123,7 +123,7 @@ class Tuning:
 
     def save(self, path: str | Path) -> None:
         """Write ``case.toml`` with the tuned case and ``report.md`` into a folder."""
-        folder = Path(path)
+        folder = path_of("path", path, "folder")
         folder.mkdir(parents=True, exist_ok=True)
         write_text(folder / "case.toml", Config(self.case).text())
         write_text(folder / "report.md", f"# Autotune of {self.case.name}\n\n{self}\n")
@@ -170,6 +170,8 @@ def autotune(
     SolverError
         If the flow breaks down while it is developed.
     """
+    if not isinstance(case, Case):
+        raise ConfigError(f"case = {shown(case)}: must be a case, such as alsph.cases.Cylinder()")
     numbers = {"divergence": divergence, "develop": develop, "probe": probe, "margin": margin}
     for name, value in numbers.items():
         number(name, value, above=0, finite=True)
