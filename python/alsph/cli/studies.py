@@ -146,5 +146,5 @@ def _print_states(declared: "alsph.study.Study", output: Path) -> None:
         say(f"preset {declared.preset} (--preset)")
     for line in overview(with_starts(points), alsph.study.states(points, output)):
         say(printable(line))
-    if remarked := tally([keywords(point.config.case.remarks()) for point in points]):
+    if remarked := tally([keywords(point.config.remarks) for point in points]):
         say(f"remarks: {remarked}")
