@@ -22,7 +22,7 @@ from alsph.study import Figure, Study, Sweep
 from alsph.study.board import Board
 from alsph.study.declaration import RUNS, Published
 from alsph.study.execution import _jobs
-from alsph.study.results import Results, _time_of_largest_lift, names
+from alsph.study.results import Results, _of, _time_of_largest_lift, names
 from alsph.study.state import State, state
 from rich.console import Console
 from synthetic import write_run
@@ -386,6 +386,8 @@ def test_each_series_has_its_own_reference(tmp_path):
     assert found["reference, Re = 200"] == ([10, 12], [0.5, 0.5])
     found = lines_of(collected(tmp_path, rows, [3.0, 3.0, 3.0, 3.0], sweep=sweep, figures=figures))
     assert found["reference"] == ([10, 12], [3.0, 3.0]) and len(found) == 3
+    assert _of(["Algorithm 1, Re = 50", "Algorithm 2, Re = 50"]) == "reference, Re = 50"
+    assert _of(["Re = 50", "Re = 100"]) == "reference, Re = 50; Re = 100"
 
 
 def test_published_values_are_drawn_where_they_belong(tmp_path):

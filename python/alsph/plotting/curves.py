@@ -259,9 +259,7 @@ def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str
     named = {
         text: handle for axes in figure.axes for handle, text in zip(*axes.get_legend_handles_labels(), strict=True)
     }
-    figure.legend(
-        [*named.values()], [*named], loc="outside lower center", ncols=2 * columns, fontsize="small", frameon=False
-    )
+    figure.legend([*named.values()], [*named], loc="outside right upper", fontsize="small", frameon=False)
     return figure
 
 

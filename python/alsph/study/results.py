@@ -315,8 +315,8 @@ class Results:
                 curves.append(Curve(DEVELOPING, *_sorted(early)[:2], style="x", colour="k"))
             shared = _shared(known)
             curves += [
-                Curve(", ".join(filter(None, ("reference", *names))), *_sorted(points), style="d--", colour="k")
-                for names, points in ([((), points) for _, points in shared] if len(shared) == 1 else shared)
+                Curve(_of(names) if len(shared) > 1 else "reference", *_sorted(points), style="d--", colour="k")
+                for names, points in shared
             ]
             where = self._where(figure)
             curves += [
@@ -409,6 +409,13 @@ def _shared(known: Mapping[str, list[tuple[Any, float]]]) -> list[tuple[list[str
         else:
             found.append(([name], list(points)))
     return found
+
+
+def _of(names: Sequence[str]) -> str:
+    """Return what reference values are called that are those of series, by what the series have in common."""
+    parts = [name.split(", ") for name in names]
+    common = [part for part in parts[0] if all(part in others for others in parts)]
+    return ", ".join(["reference", *(common or ["; ".join(names)])])
 
 
 def _in_words(parameters: Mapping[str, Any]) -> str:
