@@ -78,7 +78,12 @@ def test_orders_and_verdict_of_synthetic_errors(finished, monkeypatch):
     measuring(monkeypatch, lambda resolution: [*measures(resolution), Measure("wrong", math.nan, 1.0, 0.1, "exact")])
     report = validate(suite=FAST, output=finished.path, progress=False)
     assert not report.passed and report.verdict == "FAILED: 2 of 3 checks passed."
-    assert report.rows[-1].cells[-1] == "FAIL"
+    assert report.rows[-1].cells[4:] == ("nan", "1", "", "10 %", "", "FAIL")
+    uncertain = averages.Estimate(1.01, 0.04)
+    measuring(monkeypatch, lambda n: [Measure("a", uncertain if n > 10 else 2.0, 1.0, 0.02, "exact")])
+    row = validate(suite=FAST, output=finished.path, progress=False).rows[-1]
+    assert row.cells[4] == "1.01 ± 0.04" and row.order > 5
+    assert replace(row, order=9.6).cells[8] == "> 8"
     measuring(monkeypatch, lambda resolution: [])
     assert not validate(suite=FAST, output=finished.path, progress=False).passed
 

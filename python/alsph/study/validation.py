@@ -23,6 +23,7 @@ from alsph.results.run import Run
 from alsph.run_settings import RunSettings
 from alsph.running.control import Control
 from alsph.running.start import complete
+from alsph.study.convergence import LARGEST_ORDER
 from alsph.tables import html, markdown
 from alsph.text import duration
 
@@ -180,15 +181,18 @@ class Row:
     def cells(self) -> tuple[str, ...]:
         """The row of the report's table."""
         measure = self.measure
-        beside = f"{measure.reference:.5g}", f"{100 * measure.error:+.3g} %", f"{100 * measure.tolerance:g} %"
+        error = "" if np.isnan(measure.error) else f"{100 * measure.error:+.3g} %"
+        beside = f"{measure.reference:.5g}", error, f"{100 * measure.tolerance:g} %"
+        apart = getattr(measure.value, "uncertainty", np.nan)
+        order = f"> {LARGEST_ORDER:g}" if self.order > LARGEST_ORDER else f"{self.order:.1f}"
         return (
             self.entry.model.name,
             ", ".join(self.entry.settings),
             str(self.resolution),
             measure.name,
-            f"{measure.value:.5g}",
+            f"{measure.value:.5g} ± {apart:.2g}" if 0 < apart < np.inf else f"{measure.value:.5g}",
             *("" if np.isnan(measure.reference) else told for told in beside),
-            "" if np.isnan(self.order) else f"{self.order:.1f}",
+            "" if np.isnan(self.order) else order,
             (("pass" if measure.passed else "FAIL") if self.judged else "") + averages.remark(measure.value),
         )
 
