@@ -271,7 +271,7 @@ def convergence(errors: dict[str, dict[int, float]]) -> Figure:
     errors : dict
         The errors of each quantity by resolution D/Δx.
     """
-    figure = blank(7, 4.5)
+    figure = blank(9, 4.5)
     axes = figure.subplots()
     for number, (name, series) in enumerate(errors.items()):
         axes.loglog(
@@ -290,5 +290,5 @@ def convergence(errors: dict[str, dict[int, float]]) -> Figure:
     axes.set_xticks(resolutions, [str(resolution) for resolution in resolutions])
     axes.xaxis.minorticks_off()
     axes.grid(alpha=0.3, which="both")
-    figure.legend(loc="outside lower center", ncols=2, fontsize="small", frameon=False)
+    figure.legend(loc="outside right upper", fontsize="small", frameon=False)
     return figure

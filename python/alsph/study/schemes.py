@@ -19,7 +19,7 @@ from alsph.arguments import ladder
 from alsph.cases import find
 from alsph.cases.base import Case
 from alsph.cases.method import OWNERS, SCHEMES, of_all_schemes, of_scheme, superseded
-from alsph.cases.remarks import keywords
+from alsph.cases.remarks import keywords, tally
 from alsph.config import Config, overridden
 from alsph.errors import AlsphError, ConfigError
 from alsph.folder.durable import write_text
@@ -210,6 +210,8 @@ class SchemeComparison:
         pictures = {"cost": plotting.panels(curves, "CPU seconds a $D/U$", ("x", "y"))} if curves else {}
         runs = {row.scheme: row.run for row in self.rows if row.run and row.resolution == self._finest}
         for picture in pictures.values():
+            plotting.head(picture, self.results.study.title)
+            plotting.remark(picture, tally([keywords(row.run.remarks) for row in self.rows if row.run]))
             plotting.rename(picture, self._symbols)
         return pictures | (Comparison(runs).draw() if runs else {})
 

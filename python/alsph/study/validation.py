@@ -15,7 +15,7 @@ from alsph import cases, plotting
 from alsph.analysis import averages
 from alsph.analysis.measures import Measure
 from alsph.arguments import ladder
-from alsph.cases.remarks import keywords
+from alsph.cases.remarks import keywords, tally
 from alsph.config import Config
 from alsph.errors import ConfigError, SolverError
 from alsph.folder.durable import write_text
@@ -411,8 +411,9 @@ def _draw(entry: Entry, runs: list[Run], rows: list[Row], path: Path) -> dict[st
             errors.setdefault(row.measure.name, {})[row.resolution] = row.measure.error
     if len(runs) > 1 and errors:
         figures["convergence"] = plotting.convergence(errors)
-    titles = {}
+    titles, remarked = {}, tally([keywords(run.remarks) for run in runs])
     for name, figure in figures.items():
+        plotting.remark(figure, remarked)
         plotting.rename(figure, entry.model.symbols)
         plotting.save(figure, path / f"{entry.file_name}_{name}.png")
         titles[f"{entry.file_name}_{name}.png"] = ", ".join([entry.model.name, *entry.settings, name.replace("_", " ")])
