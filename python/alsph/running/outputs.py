@@ -61,7 +61,7 @@ class Samples:
         samples.truncate(path, time)
 
 
-class Probes(Samples):
+class ProbeSamples(Samples):
     """Fields at points over time, NaN while a body is there."""
 
     def sample(self, simulation: Simulation, rows: Mapping[str, NDArray[Any]]) -> dict[str, FloatArray]:
@@ -192,7 +192,7 @@ def _samples_of(config: Config) -> Iterator[Samples]:
     if points:
         yield SurfacePressure(points, run.surface_interval, config.case)
     if len(probes):
-        yield Probes("probes.h5", run.probe_interval or PROBE_INTERVAL, {"position": probes})
+        yield ProbeSamples("probes.h5", run.probe_interval or PROBE_INTERVAL, {"position": probes})
     if planes:
         number = np.repeat(np.arange(len(planes)), [*map(len, planes)])
         where = {"position": np.concatenate(planes), "plane": number}
