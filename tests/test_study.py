@@ -111,6 +111,26 @@ def test_a_declaration_that_cannot_be_used_is_refused_with_the_reason(make, mess
         make()
 
 
+def test_a_rule_that_fails_in_one_run_names_it(tmp_path, alsph):
+    (tmp_path / "stirred.py").write_text(
+        "from alsph.cases import TaylorGreen\n\n\nclass Stirred(TaylorGreen):\n    strength: float = 1.0\n\n"
+        "    def forcing(self, position, time):\n        return position * (1 // int(self.strength - 2))\n"
+    )
+    path = tmp_path / "study.toml"
+    declared = 'name = "a"\nbase = {{case = "stirred.py:Stirred"}}\nsweep.product.strength = [1.0, {}]\n'
+    path.write_text(declared.format(2.0))
+    with pytest.raises(ZeroDivisionError) as raised:
+        study.load(path).points()
+    assert raised.value.__notes__[-1] == "in the run with strength 2"
+    code, _, complaints = alsph("study", "run", path, "-o", tmp_path / "out", "--dry-run")
+    assert code == 2 and complaints.startswith("error: forcing: the function failed at t* = ")
+    assert complaints.endswith("; in the run with strength 2\n")
+    text = (tmp_path / "stirred.py").read_text().replace("position * (1 // int(self.strength - 2))", "self.strength")
+    (tmp_path / "stirred.py").write_text(text)
+    with pytest.raises(ConfigError, match=r"study a, strength 1: .*forcing: the function must give 2 numbers"):
+        study.load(path).points()
+
+
 def test_files_that_cannot_be_used_are_refused_with_their_name(tmp_path):
     path = tmp_path / "study.toml"
     for content, message in (

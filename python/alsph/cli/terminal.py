@@ -43,10 +43,10 @@ def exit_codes() -> Iterator[None]:
     except Exception as error:  # in a function of the user's, or a defect of alsph's
         from alsph.engine.prescribed import FAILED
 
-        told = [note for note in getattr(error, "__notes__", []) if FAILED in note]
-        if not told:
+        notes = getattr(error, "__notes__", [])
+        if not any(FAILED in note for note in notes):
             raise
-        complain(f"error: {told[0]}", "red")
+        complain(f"error: {'; '.join(notes)}", "red")
         raise typer.Exit(2) from None
 
 

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from alsph import config
 from alsph.config import Config, of_the_flow
 from alsph.engine.prescribed import fingerprint
-from alsph.errors import ConfigError
+from alsph.errors import AlsphError, ConfigError
 from alsph.parameters import Parameters, suggest
 from alsph.plotting.pictures import field_style
 from alsph.results.run import Run
@@ -235,7 +235,8 @@ class Study(Parameters):
         Raises
         ------
         ConfigError
-            If a case cannot be made; the message names the parameters.
+            If a case cannot be made, or its rules give no vectors; the message names the parameters. What a rule
+            raises comes out as it is, with a note that names them.
         """
         points: dict[str, Point] = {}
         for ladder in self.sweep.ladders():
@@ -244,7 +245,13 @@ class Study(Parameters):
                 config = self._config(parameters)
                 every = {name: parameters.get(name, self._unswept(name, config)) for name in self.swept}
                 previous = Point(every, config, previous, self._start(parameters))
-                points.setdefault(previous.name, previous)
+                try:
+                    points.setdefault(previous.name, previous)
+                except AlsphError as error:  # in a rule of the case, which the name is formed of
+                    raise ConfigError(f"study {self.name}, {previous.label}: {error}") from None
+                except Exception as error:
+                    error.add_note(f"in the run with {previous.label}")
+                    raise
         return list(points.values())
 
     def _unswept(self, name: str, config: Config) -> Any:
