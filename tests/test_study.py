@@ -397,6 +397,19 @@ def test_what_a_set_does_not_name_is_as_it_is_without(tmp_path):
     assert len(found) == 2
 
 
+def test_a_run_without_a_value_on_the_abscissa_is_not_on_it(tmp_path):
+    """As one whose time step follows from its Courant number, beside others whose step is given."""
+    sweep = Sweep(sets=[{}, {"time_step": 0.05}, {"time_step": 0.1}])
+    rows = [({"time_step": step}, 1.0 + (step or 0.0)) for step in (None, 0.05, 0.1)]
+    figures = [Figure(name="decay", x="time_step", y=[DECAY])]
+    results = collected(tmp_path, rows, [3.0, 3.0, 3.0], sweep=sweep, figures=figures)
+    assert [[*line.get_xdata()] for line in results.draw()["decay"].axes[0].lines] == [[0.05, 0.1], [0.05, 0.1]]
+    figures = [Figure(name="decay", x="time_step", y=[DECAY], finest="time_step")]
+    results = collected(tmp_path, rows, sweep=sweep, figures=figures)
+    assert [[*line.get_xdata()] for line in results.draw()["decay"].axes[0].lines] == [[0.1]]
+    assert "| not given " in results.to_markdown()
+
+
 def test_each_series_has_its_own_reference(tmp_path):
     figures = [Figure(name="decay", x="resolution", y=[DECAY])]
     sweep = Sweep(product={"reynolds": [50, 200], "resolution": [10, 12]})

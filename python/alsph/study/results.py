@@ -274,18 +274,16 @@ class Results:
 
     def _chosen(self, figure: Figure) -> list[int]:
         """Return the finished runs that a figure shows."""
-        where = self._where(figure)
-        return [
-            index
-            for index, row in enumerate(self.rows)
-            if row["status"] == "finished" and all(row.get(name) == value for name, value in where.items())
-        ]
+        where = self._where(figure).items()
+        finished = [index for index, row in enumerate(self.rows) if row["status"] == "finished"]
+        return [index for index in finished if all(self.rows[index].get(name) == value for name, value in where)]
 
     def _where(self, figure: Figure) -> dict[str, Any]:
         """Return the parameters that the runs of a figure have."""
         where = dict(figure.where)
         if figure.finest:
-            where[figure.finest] = max(row[figure.finest] for row in self.rows)
+            given = (value for row in self.rows if (value := row[figure.finest]) is not None)
+            where[figure.finest] = max(given, default=None)
         return where
 
     def _series(self, row: Mapping[str, Any], without: str = "") -> str:
@@ -297,7 +295,7 @@ class Results:
         return ", ".join(parts)
 
     def _curves(self, figure: Figure) -> Picture | None:
-        chosen = self._chosen(figure)
+        chosen = [index for index in self._chosen(figure) if self.rows[index][figure.x] is not None]
         panels: dict[str, list[Curve]] = {}
         for y in figure.y:
             series: dict[str, list[tuple[Any, Any]]] = {}
@@ -305,7 +303,7 @@ class Results:
             for index in chosen:
                 row = self.rows[index]
                 name = self._series(row, figure.x)
-                if not _is_nan(self.found[index].get(y)) and row[figure.x] is not None:
+                if not _is_nan(self.found[index].get(y)):
                     series.setdefault(name, []).append((row[figure.x], self.found[index][y]))
                 if y in self.references[index]:
                     known.setdefault(name, []).append((row[figure.x], self.references[index][y]))
