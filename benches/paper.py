@@ -1,8 +1,8 @@
 """The paper's figures at its own resolutions, D/Δx = 20 and 30, from the runs that there are.
 
 Runs take hours each and their folders do not last, so a row of each is kept in docs/studies/resolved/rows.csv,
-whatever study it was made in. `add` puts in the row of a run folder, in place of that of the same flow and method;
-without it the figures are drawn.
+whatever study it was made in, and one of its mean C_p by degrees from the front in pressure_coefficient.csv. `add` puts
+in the rows of a run folder, in place of those of the same flow and method; without it the figures are drawn.
 
     python benches/paper.py add runs/studies/runs/cylinder_NAME --commit 41e3d16 --cpu-seconds 5581
     python benches/paper.py
@@ -10,6 +10,7 @@ without it the figures are drawn.
 
 import argparse
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 
 import alsph
@@ -20,6 +21,7 @@ from alsph.plotting import Curve
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "studies" / "resolved"
 ROWS = FOLDER / "rows.csv"
+PROFILES = FOLDER / "pressure_coefficient.csv"
 
 # What a row is of; the same of two runs is the same flow by the same method.
 KEY = ("resolution", "reynolds", "method", "algorithm", "iterations", "time_step")
@@ -39,6 +41,8 @@ COLUMNS = (
     "CPU seconds",
     "commit",
 )
+
+DEGREES = [str(degrees) for degrees in range(0, 181, 5)]
 
 # The paper's Table 1: Re = 200, D/Δx = 30.
 PRINTED = {1: {DRAG: 1.427, LIFT: 0.478, STROUHAL: 0.213}, 2: {DRAG: 1.428, LIFT: 0.482, STROUHAL: 0.211}}
@@ -104,17 +108,26 @@ def row(path: Path, commit: str, cpu_seconds: float) -> dict[str, str]:
     }
 
 
-def read() -> list[dict[str, str]]:
+def profile(path: Path) -> dict[str, str]:
+    """Return the mean C_p of a run folder, that of both sides."""
+    found = alsph.open_run(path).pressure_coefficient
+    sides = [np.interp([float(at) for at in DEGREES], sign * found.theta, found.mean, period=360) for sign in (1, -1)]
+    return {at: f"{value:.4f}" for at, value in zip(DEGREES, np.mean(sides, axis=0), strict=True)}
+
+
+def read(path: Path) -> list[dict[str, str]]:
     """Return the rows that are there."""
-    with ROWS.open() as file:
+    if not path.exists():
+        return []
+    with path.open() as file:
         return list(csv.DictReader(file))
 
 
-def add(new: dict[str, str]) -> None:
+def add(path: Path, columns: Sequence[str], new: dict[str, str]) -> None:
     """Put a row in."""
-    rows = {tuple(each[name] for name in KEY): each for each in [*read(), new]}
-    with ROWS.open("w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+    rows = {tuple(each[name] for name in KEY): each for each in [*read(path), new]}
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, columns, lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows[key] for key in sorted(rows))
 
@@ -170,7 +183,7 @@ def curves(rows: list[dict[str, str]], x: str, fixed: dict[str, float], y: str) 
 
 def draw() -> None:
     """Draw the figures that have two abscissae or more."""
-    rows = read()
+    rows = read(ROWS)
     for name, (x, fixed, ordinates, logarithmic) in FIGURES.items():
         shown = {LABELS[y]: curves(rows, x, fixed, y) for y in ordinates}
         if len({value for lines in shown.values() for line in lines for value in line.x}) < 2:
@@ -179,19 +192,42 @@ def draw() -> None:
         flows = [{"case": "cylinder", "resolution": resolution, **fixed} for resolution in (20, 30)]
         plotting.head(picture, plotting.title(flows))
         plotting.save(picture, FOLDER / f"{name}.png", dpi=120)
+    draw_pressure()
+
+
+def draw_pressure() -> None:
+    """Draw C_p over the angle, Figure 10: each number of iterations, a panel for either wall."""
+    fixed = {"reynolds": 200, "time_step": 0.0508}
+    shown: dict[str, list[Curve]] = {}
+    for each in read(PROFILES):
+        if all(number(each[name]) == value for name, value in fixed.items()):
+            walls = "the paper's walls" if each["method"] == "the paper's walls" else "alsph's walls"
+            label = "Algorithm {algorithm}, {iterations} iterations, $D/\\Delta x$ = {resolution}".format(**each)
+            points = [(float(at), number(each[at]), 0.0) for at in DEGREES]
+            shown.setdefault(f"$C_p'$, {walls}", []).append(curve(label, points, style="-"))
+    known = reference.cylinder_in_channel(200)
+    if shown and known and known.pressure_coefficient:
+        points = [(at, value, 0.0) for at, value in zip(*known.pressure_coefficient, strict=True)]
+        for lines in shown.values():
+            lines.append(curve("reference", points, style="--", colour="k"))
+        picture = plotting.panels(shown, "degrees from the front")
+        plotting.head(picture, plotting.title([{"case": "cylinder", **fixed}]))
+        plotting.save(picture, FOLDER / "figure_10.png", dpi=120)
 
 
 def main() -> None:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command")
-    adding = commands.add_parser("add", help="put in the row of a run folder")
+    adding = commands.add_parser("add", help="put in the rows of a run folder")
     adding.add_argument("run", type=Path, help="run folder")
     adding.add_argument("--commit", required=True, help="commit that it was made with")
     adding.add_argument("--cpu-seconds", type=float, required=True, help="what it took [s]")
     arguments = parser.parse_args()
     if arguments.command:
-        add(row(arguments.run, arguments.commit, arguments.cpu_seconds))
+        found = row(arguments.run, arguments.commit, arguments.cpu_seconds)
+        add(ROWS, COLUMNS, found)
+        add(PROFILES, (*KEY, *DEGREES), {name: found[name] for name in KEY} | profile(arguments.run))
     else:
         draw()
 
