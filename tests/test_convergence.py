@@ -64,6 +64,11 @@ def test_a_case_is_run_judged_and_drawn(tmp_path):
     assert str(report) in text and "convergence.png" in text
     assert (report.path / "convergence.png").stat().st_size > 10_000
     assert convergence.SAFETY == 1.25
+    other = converge(config, [8, 10, 12], tmp_path, progress=False)
+    assert (report.path / "convergence.md").read_text() == text
+    assert {row["folder"] for row in report.results.rows if row["resolution"] < 16} < {
+        row["folder"] for row in other.results.rows
+    }
 
 
 def test_a_measure_that_is_nan_is_told_with_its_run_and_why(tmp_path):

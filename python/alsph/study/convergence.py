@@ -272,7 +272,7 @@ def converge(
     if len(sizes) < 3:
         raise ConfigError(f"resolutions = {sizes}: convergence needs three or more")
     declared = Study(
-        name=f"converge-{config.case.name}-{digest(config, 'resolution')[:6]}",
+        name=f"converge-{config.case.name}-{digest(config, 'resolution')[:6]}-{'-'.join(map(str, sizes))}",
         title=f"Convergence of {config.case.name}",
         base=config.tables(),
         sweep=Sweep(product={"resolution": sizes}),
