@@ -22,8 +22,6 @@ mod common;
 
 const SIDE: usize = 24;
 const TIME_STEP: f64 = 0.002;
-/// β of projection ISPH.
-const SHARE: f64 = 0.9;
 
 /// A disordered periodic box of fluid in motion under pressure.
 fn box_of_fluid() -> Particles<2> {
@@ -278,27 +276,19 @@ fn first_flow(settings: &Settings, start: Particles<2>) -> Flow<2> {
     }
 }
 
-fn isph() -> Value {
-    json!({"kind": "isph", "pressure_share": SHARE, "solver": "bicgstab", "tolerance": 1e-6, "max_solver_iterations": 99})
-}
-
 /// Without viscosity a step changes the velocity by the gradient of the acting pressure, with sweeps and without, and says what
 /// divergence it leaves.
 #[test]
 fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
-    let by_iterations =
-        [(0, "rough"), (3, "rough"), (3, "smooth")].map(|(sweeps, kept)| (json!({"kind": "alsph"}), sweeps, kept));
-    let by_solves = [(0, "smooth"), (1, "rough"), (1, "smooth")].map(|(sweeps, kept)| (isph(), sweeps, kept));
-    for (scheme, sweeps, kept) in by_iterations.into_iter().chain(by_solves) {
+    for (sweeps, kept) in [(0, "rough"), (3, "rough"), (3, "smooth")] {
         let mut value = settings("initial");
         (value["projection_sweeps"], value["sweep_pressure"]) = (json!(sweeps), kept.into());
-        (value["scheme"], value["wall_pressure"]) = (scheme, "linear".into());
         value["kinematic_viscosity"] = json!(1e-15);
         value["body_force"] = json!([0.0, 0.0]);
         let settings = common::parse(&value);
         let mut flow = first_flow(&settings, box_of_fluid());
         let step = Step { settings: &settings, time_step: TIME_STEP, velocity_max: 1.0 };
-        let mut scheme = alsph::scheme::build(&settings);
+        let mut scheme = Alsph::new(&settings);
         // A second step in the same frame has nothing of the first.
         for _ in 0..2 {
             flow.remember();
@@ -318,31 +308,6 @@ fn the_velocity_changes_by_the_gradient_of_all_that_acts() {
             assert_relative_eq!(outcome.divergence_sum, divergence.sum::<f64>(), max_relative = 1e-9);
             let Set { particles, frame } = set;
             flow = Flow { particles, frame, walls, before, body_force, surface, motion };
-        }
-    }
-}
-
-/// Of what a solve adds 1 − λ/λ_max is kept of a wave with an eigenvalue λ of the compact Laplacian; all of a pressure that begins anew.
-#[test]
-fn the_shortest_waves_of_a_solve_are_not_kept() {
-    let explicit = json!({"kind": "explicit_isph", "sweeps": 2, "mach_number": 0.1});
-    for (scheme, kept, smooth) in [(isph(), "smooth", 1.0), (isph(), "rough", 0.0), (explicit, "smooth", 0.0)] {
-        let mut value = settings("initial");
-        (value["scheme"], value["wall_pressure"]) = (scheme, "linear".into());
-        (value["projection_sweeps"], value["sweep_pressure"]) = (json!(0), kept.into());
-        let settings = common::parse(&value);
-        let mut flow = first_flow(&settings, box_of_fluid());
-        let before: Vec<_> = flow.particles.pressure.iter().map(|p| SHARE * p).collect();
-        let step = Step { settings: &settings, time_step: TIME_STEP, velocity_max: 1.0 };
-        let mut scheme = alsph::scheme::build(&settings);
-        scheme.solve(step, &mut flow);
-        let Flow { particles, frame, .. } = flow;
-        let acting: Vec<_> = (0..particles.len()).map(|i| scheme.acting_pressure(step, &particles, i)).collect();
-        let added: Vec<_> = acting.iter().zip(&before).map(|(p, before)| [p - before; 2]).collect();
-        let set = Set { particles, frame };
-        let shortest = smooth * settings.particle_spacing.powi(2) / settings.largest_laplacian_eigenvalue();
-        for (i, (_, laplacian)) in set.apply(GradientAndLaplacian(&added)).into_iter().enumerate() {
-            assert_relative_eq!(set.particles.pressure[i], acting[i] + shortest * laplacian, epsilon = 1e-10);
         }
     }
 }

@@ -4,9 +4,7 @@
 //! u* = u^n + Δt (ν ∇²u^n + g − β ∇p^n/ρ),    ∇²q = ρ/Δt (∇·u* − θ),    p^{n+1} = β p^n + q,    u^{n+1} = u* − Δt/ρ ∇q
 //! ```
 //!
-//! with the compact Laplacian, so that a divergence of the order Δx² stays (an approximate projection). The shortest waves of q push but
-//! are not kept, as of [sweeps](crate::scheme::projection): the gradient sees next to nothing of them, and from layer to layer at walls β
-//! would pile them up. β = 0 solves the pressure anew (Cummins and
+//! with the compact Laplacian, so that a divergence of the order Δx² stays (an approximate projection). β = 0 solves the pressure anew (Cummins and
 //! Rudman 1999; Shadloo et al. 2011), β = 1 its change. θ is [`DerivativeFrame::solenoidal_divergence`], and with a density that is
 //! constrained, too, α (n/n₀ − 1)/Δt beside it, of the number density n and the lattice's n₀. Solids show q with ∂q/∂n = 0
 //! to the Laplacian, and the fluid has their share of the flux into walls ([`add_wall_flux`]); to the gradient they show the pressure of the
@@ -16,14 +14,14 @@
 
 use crate::base::{Matrix, Vector, parallel};
 use crate::boundary::{PressureRule, VelocityRule, add_wall_flux, conditions, extend_pressure};
-use crate::discretisation::{Divergence, Gradient, GradientAndLaplacian};
+use crate::discretisation::{Divergence, Gradient};
 use crate::flow::{Flow, Step};
 use crate::particles::Particles;
 use crate::poisson::{Goal, Poisson, Solution, System};
 use crate::scheme::projection::{Projection, Sweeps};
 use crate::scheme::viscous::Viscous;
 use crate::scheme::{Scheme, Solved};
-use crate::settings::{Eigenvalues, ProjectionSettings, Settings, Solver, SweepPressure, TimeStepLimits, jacobi_damping};
+use crate::settings::{Eigenvalues, ProjectionSettings, Settings, Solver, TimeStepLimits, jacobi_damping};
 use crate::shifting::measures_divergence;
 
 /// Damping of Jacobi's iteration (Muta, Ramachandran and Negi 2020).
@@ -102,8 +100,6 @@ pub struct Isph<const D: usize> {
     base: Vec<f64>,
     /// q.
     change: Vec<f64>,
-    /// q, to take gradient and Laplacian of.
-    twice: Vec<[f64; 2]>,
     /// ∇p near solids, where the pressure is continued into them.
     near_walls: Vec<Vector<D>>,
     divergence: Vec<f64>,
@@ -137,7 +133,6 @@ impl<const D: usize> Isph<D> {
             handed: Vec::new(),
             base: Vec::new(),
             change: Vec::new(),
-            twice: Vec::new(),
             near_walls: Vec::new(),
             divergence: Vec::new(),
             poisson: Poisson::default(),
@@ -214,26 +209,15 @@ impl<const D: usize> Isph<D> {
         self.extend_pressure(step.settings, flow);
         let Flow { particles, frame, .. } = flow;
         parallel::for_each(&mut self.change, |i, change| *change = particles.pressure[i] - self.base[i]);
-        frame.images.blank(&mut self.twice, self.change.len());
-        parallel::for_each(&mut self.twice, |i, twice| *twice = [self.change[i]; 2]);
-        let Particles { kind, position, velocity, pressure, .. } = particles;
+        let Particles { kind, position, velocity, .. } = particles;
         let (star, factor, condition) =
             (&self.velocity_star, step.time_step / step.settings.density, conditions(step.settings));
-        let smooth = self.pressure_share > 0.0 && step.settings.sweep_pressure == SweepPressure::Smooth;
-        let shortest = if smooth { self.sweeps.shortest } else { 0.0 };
-        frame.stencil.for_each(
-            GradientAndLaplacian(&self.twice),
-            frame.images.real(velocity),
-            frame.images.real(pressure),
-            |i, (gradient, laplacian), u, p| {
-                if condition(kind[i], &position[i]).velocity == VelocityRule::Solved {
-                    *u = star[i] - gradient * factor;
-                    *p += laplacian * shortest;
-                }
-            },
-        );
+        frame.stencil.for_each_one(Gradient(&self.change), frame.images.real(velocity), |i, gradient, u| {
+            if condition(kind[i], &position[i]).velocity == VelocityRule::Solved {
+                *u = star[i] - gradient * factor;
+            }
+        });
         frame.images.fill(velocity);
-        frame.images.fill(pressure);
     }
 }
 
@@ -280,7 +264,7 @@ impl<const D: usize> Scheme<D> for Isph<D> {
     }
 
     fn acting_pressure(&self, _: Step, particles: &Particles<D>, i: usize) -> f64 {
-        self.base[i] + self.change[i] + self.projection.pushed(particles, i)
+        particles.pressure[i] + self.projection.unkept(particles, i)
     }
 
     fn viscous_laplacian(&self, _: Step, i: usize) -> Vector<D> {

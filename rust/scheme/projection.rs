@@ -45,7 +45,7 @@ pub struct Sweeps {
     /// σ.
     pub(super) relaxation: f64,
     /// One over the largest eigenvalue of the compact Laplacian: so much of it takes the shortest waves off.
-    pub(super) shortest: f64,
+    shortest: f64,
     /// Σ 1/weight of all.
     together: f64,
 }
@@ -94,19 +94,12 @@ impl Projection {
         self.rough.clear();
     }
 
-    /// What the sweeps of this step pushed with.
-    pub fn pushed<const D: usize>(&self, particles: &Particles<D>, i: usize) -> f64 {
-        let share = self.rough.get(i).map_or_else(|| self.kept(particles, i), |[_, rough]| *rough);
-        share / PRESSURE_SHARE
-    }
-
-    /// What of that the pressure has not kept.
+    /// What the sweeps of this step pushed with, and the pressure has not kept.
     pub fn unkept<const D: usize>(&self, particles: &Particles<D>, i: usize) -> f64 {
-        self.pushed(particles, i) - self.kept(particles, i)
-    }
-
-    fn kept<const D: usize>(&self, particles: &Particles<D>, i: usize) -> f64 {
-        self.pressure_before.get(i).map_or(0.0, |before| particles.pressure[i] - before)
+        let Some(before) = self.pressure_before.get(i) else { return 0.0 };
+        let kept = particles.pressure[i] - before;
+        let share = self.rough.get(i).map_or(kept, |[_, rough]| *rough);
+        share / PRESSURE_SHARE - kept
     }
 
     /// All sweeps of one step. They take off what ∇·u of a particle has beyond `solenoidal`.

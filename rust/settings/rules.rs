@@ -203,7 +203,7 @@ pub enum SweepWeights {
     Chebyshev,
 }
 
-/// What the pressure keeps of the projection sweeps, and of what a solve of ISPH adds to it.
+/// What the pressure keeps of the projection sweeps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SweepPressure {

@@ -242,8 +242,8 @@ class Method(Parameters):
     )
     sweep_pressure: Literal["smooth", "rough"] | None = Field(
         default=None,
-        description="what the pressure keeps of the sweeps, and of a solve with isph: without the shortest waves, or "
-        "as it is; if not given smooth, or rough beside a penalty_constant",
+        description="what the pressure keeps of the sweeps, without the shortest waves or as it is; if not given "
+        "smooth, or rough beside a penalty_constant",
     )
     tolerance: float = Field(default=1e-3, gt=0, description="largest |∇·u| at which the iterations end, ε [U/D]")
     penalty_constant: float | None = Field(
