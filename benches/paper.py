@@ -42,6 +42,9 @@ COLUMNS = (
     "commit",
 )
 
+# The pressure of (20), and the wall's own velocity or, after a comma, the rule by which it is extrapolated.
+PAPERS_WALLS = "the paper's walls"
+
 DEGREES = [str(degrees) for degrees in range(0, 181, 5)]
 
 # The paper's Table 1: Re = 200, D/Δx = 30.
@@ -76,7 +79,9 @@ def method(case: alsph.cases.Cylinder) -> str:
     """Return what a run's method is called here."""
     if case.projection_sweeps:
         return "alsph's defaults"
-    return "the paper's walls" if case.wall_pressure == "paper" else "the paper's steps"
+    if case.wall_pressure != "paper":
+        return "the paper's steps"
+    return PAPERS_WALLS if case.wall_velocity == "paper" else f"{PAPERS_WALLS}, {case.wall_velocity}"
 
 
 def row(path: Path, commit: str, cpu_seconds: float) -> dict[str, str]:
@@ -153,7 +158,7 @@ def curves(rows: list[dict[str, str]], x: str, fixed: dict[str, float], y: str) 
         if not (wanted and each[y]):
             continue
         name = "defaults" if defaults else f"Algorithm {each['algorithm']}"
-        walls = ", the paper's walls" if each["method"] == "the paper's walls" else ""
+        walls = f", {each['method']}" if each["method"].startswith(PAPERS_WALLS) else ""
         point = (number(each[x]), number(each[y]), number(each.get(f"{y}, ±", "")))
         series.setdefault(f"{name}{walls}, $D/\\Delta x$ = {each['resolution']}", []).append(point)
         if each[DEVELOPING]:
@@ -201,7 +206,7 @@ def draw_pressure() -> None:
     shown: dict[str, list[Curve]] = {}
     for each in read(PROFILES):
         if all(number(each[name]) == value for name, value in fixed.items()):
-            walls = "the paper's walls" if each["method"] == "the paper's walls" else "alsph's walls"
+            walls = each["method"] if each["method"].startswith(PAPERS_WALLS) else "alsph's walls"
             label = "Algorithm {algorithm}, {iterations} iterations, $D/\\Delta x$ = {resolution}".format(**each)
             points = [(float(at), number(each[at]), 0.0) for at in DEGREES]
             shown.setdefault(f"$C_p'$, {walls}", []).append(curve(label, points, style="-"))
