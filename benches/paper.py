@@ -84,9 +84,8 @@ def method(case: alsph.cases.Cylinder) -> str:
     return PAPERS_WALLS if case.wall_velocity == "paper" else f"{PAPERS_WALLS}, {case.wall_velocity}"
 
 
-def row(path: Path, commit: str, cpu_seconds: float) -> dict[str, str]:
-    """Return the row of a run folder."""
-    run = alsph.open_run(path)
+def row(run: alsph.Run, commit: str, cpu_seconds: float) -> dict[str, str]:
+    """Return the row of a run."""
     case, window = run.config.case, run.window
     found = {measure.name: measure.value for measure in run.measures}
     found[DIVERGENCE] = run.divergence.mean
@@ -113,17 +112,14 @@ def row(path: Path, commit: str, cpu_seconds: float) -> dict[str, str]:
     }
 
 
-def profile(path: Path) -> dict[str, str]:
-    """Return the mean C_p of a run folder, that of both sides."""
-    found = alsph.open_run(path).pressure_coefficient
-    sides = [np.interp([float(at) for at in DEGREES], sign * found.theta, found.mean, period=360) for sign in (1, -1)]
-    return {at: f"{value:.4f}" for at, value in zip(DEGREES, np.mean(sides, axis=0), strict=True)}
+def profile(run: alsph.Run) -> dict[str, str]:
+    """Return the mean C_p of a run, that of both sides."""
+    (found,) = run.profiles
+    return {at: f"{np.interp(float(at), *found.computed):.4f}" for at in DEGREES}
 
 
 def read(path: Path) -> list[dict[str, str]]:
     """Return the rows that are there."""
-    if not path.exists():
-        return []
     with path.open() as file:
         return list(csv.DictReader(file))
 
@@ -197,7 +193,6 @@ def draw() -> None:
         flows = [{"case": "cylinder", "resolution": resolution, **fixed} for resolution in (20, 30)]
         plotting.head(picture, plotting.title(flows))
         plotting.save(picture, FOLDER / f"{name}.png", dpi=120)
-    draw_pressure()
 
 
 def draw_pressure() -> None:
@@ -230,11 +225,13 @@ def main() -> None:
     adding.add_argument("--cpu-seconds", type=float, required=True, help="what it took [s]")
     arguments = parser.parse_args()
     if arguments.command:
-        found = row(arguments.run, arguments.commit, arguments.cpu_seconds)
+        run = alsph.open_run(arguments.run)
+        found = row(run, arguments.commit, arguments.cpu_seconds)
         add(ROWS, COLUMNS, found)
-        add(PROFILES, (*KEY, *DEGREES), {name: found[name] for name in KEY} | profile(arguments.run))
+        add(PROFILES, (*KEY, *DEGREES), {name: found[name] for name in KEY} | profile(run))
     else:
         draw()
+        draw_pressure()
 
 
 if __name__ == "__main__":
