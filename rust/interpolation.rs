@@ -1,8 +1,10 @@
 //! The pressure that acts, and values of the fluid at any point: quadratic moving least squares.
 
-use crate::base::{Vector, parallel};
+use crate::base::{Matrix, Vector, parallel};
 use crate::boundary::shepard;
+use crate::discretisation::Stencil;
 use crate::frame::Frame;
+use crate::halo::Mirrored;
 use crate::kernel::{Smoothing, with_kernel};
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
@@ -10,6 +12,11 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Largest sum of the moduli of the weights of a fit, whose sum is one.
 const LARGEST_AMPLIFICATION: f64 = 8.0;
+
+/// What ∇p of a particle counts in a fit beside its p: as much as a difference of pressure over so many Δx. Where p errs from layer to
+/// layer, which its gradient sees less of, a fit of p alone reads that at a surface several times over; next to walls the gradient errs,
+/// too, so that a smooth p is read better alone.
+const GRADIENT_SPAN: f64 = 0.25;
 
 /// The pressure of particles and images: what they keep of it and, of what else pushed the fluid in the last step, the mean over the
 /// kernel's support. Next to walls that alternates from layer to layer, which no gradient sees and no fit can read. It takes about as
@@ -20,12 +27,11 @@ pub fn smooth_acting_pressure<const D: usize>(
     Frame { stencil, images, .. }: &Frame<D>,
     wanted: impl Fn(usize) -> bool + Sync,
 ) -> Vec<f64> {
-    let Particles { kind, pressure, unkept_pressure, .. } = particles;
+    let Particles { pressure, unkept_pressure, .. } = particles;
     let mut acting = pressure.clone();
     if settings.has_unkept_pressure() {
         parallel::for_each(images.real(&mut acting), |i, acting| {
             if wanted(i)
-                && kind[i] != ParticleKind::Solid
                 && let Some([mean]) = shepard(settings, stencil, i, |j, _| [unkept_pressure[j]])
             {
                 *acting += mean;
@@ -36,18 +42,68 @@ pub fn smooth_acting_pressure<const D: usize>(
     acting
 }
 
-/// Whether each real particle, or an image of it, is near any of `points`.
-pub fn is_near<const D: usize>(
-    settings: &Settings,
-    particles: &Particles<D>,
-    frame: &Frame<D>,
-    points: &[Vector<D>],
-) -> Vec<bool> {
-    let mut is_near = vec![false; particles.real];
-    for point in points {
-        for_each_near(settings, particles, frame, point, |j| is_near[frame.images.source(particles.real, j)] = true);
+/// The pressure that acts near some points, of particles and images, and where it alternates how it changes there, of real particles.
+pub struct ActingPressure<const D: usize> {
+    value: Vec<f64>,
+    slope: Vec<Option<Slope<D>>>,
+}
+
+impl<const D: usize> ActingPressure<D> {
+    /// That near `points`; the stencil's corrections are known where the pressure alternates.
+    pub fn near(settings: &Settings, particles: &Particles<D>, frame: &Frame<D>, points: &[Vector<D>]) -> Self {
+        let mut near = vec![false; particles.real];
+        for point in points {
+            for_each_near(settings, particles, frame, point, |j| near[frame.images.source(particles.real, j)] = true);
+        }
+        let slopes = settings.pressure_alternates();
+        let mut wanted = near.clone();
+        if slopes {
+            for i in (0..particles.real).filter(|&i| near[i]) {
+                let row = frame.stencil.neighbours.row(i).0;
+                row.all().iter().for_each(|entry| wanted[frame.images.source(particles.real, entry.j())] = true);
+            }
+        }
+        let value = smooth_acting_pressure(settings, particles, frame, |i| wanted[i]);
+        let mut slope = vec![None; particles.real];
+        parallel::for_each(&mut slope, |i, slope| {
+            if slopes && near[i] && particles.kind[i] != ParticleKind::Solid {
+                *slope = Slope::of(&frame.stencil, &value, i);
+            }
+        });
+        Self { value, slope }
     }
-    is_near
+}
+
+/// How a field changes next to a particle, as its neighbours tell.
+#[derive(Clone, Copy)]
+struct Slope<const D: usize> {
+    /// Its gradient, exact for linear fields. (15)
+    gradient: Vector<D>,
+    /// The same of r_k r_l about the particle, whose true one is zero: entry (m, l) of the k-th is that along m.
+    bend: [Matrix<D>; D],
+}
+
+impl<const D: usize> Slope<D> {
+    /// None where too few neighbours tell of it.
+    fn of(Stencil { neighbours, position, correction, .. }: &Stencil<D>, field: &[f64], i: usize) -> Option<Self> {
+        let inverse = (!correction[i].is_singular()).then_some(correction[i].inverse)?;
+        let (mut gradient, mut bend) = (Vector::zeros(), [Matrix::zeros(); D]);
+        let (row, lane) = neighbours.row(i);
+        for entry in row.all() {
+            let r_ij = position[i] - position[entry.j()];
+            let weight = inverse * r_ij * entry.slope(lane);
+            gradient += weight * (field[entry.j()] - field[i]);
+            bend.iter_mut().enumerate().for_each(|(k, bend)| *bend += weight * r_ij.transpose() * r_ij[k]);
+        }
+        Some(Self { gradient, bend })
+    }
+}
+
+impl<const D: usize> Mirrored<D> for Slope<D> {
+    fn mirrored(self, sign: &Vector<D>) -> Self {
+        let bend = |k: usize| Matrix::from_fn(|m, l| sign[k] * sign[m] * sign[l] * self.bend[k][(m, l)]);
+        Self { gradient: self.gradient.mirrored(sign), bend: std::array::from_fn(bend) }
+    }
 }
 
 /// `f` for every particle and image less than the support radius away from `point`.
@@ -67,76 +123,130 @@ fn for_each_near<const D: usize>(
     }
 }
 
-/// Pressure and velocity at `point` from the fluid around it that is seen from there, the particles having such a `pressure`: exact for
+/// Pressure and velocity at `point` from the fluid around it that is seen from there, the particles having the `pressure` near it: exact for
 /// quadratic fields, for linear ones where few particles are near. None where no fluid is near.
 pub fn interpolate<const D: usize>(
     settings: &Settings,
     particles: &Particles<D>,
     frame: &Frame<D>,
-    pressure: &[f64],
+    pressure: &ActingPressure<D>,
     point: &Vector<D>,
 ) -> Option<(f64, Vector<D>)> {
-    let radius = settings.support_radius();
     let (mut near, mut solid) = (Vec::new(), Vec::new());
     for_each_near(settings, particles, frame, point, |j| {
         if particles.kind[j] == ParticleKind::Solid { solid.push(j) } else { near.push(j) }
     });
-    let weights = with_kernel!(settings.kernel, kernel => {
-        let kernel = Smoothing::new(kernel, settings.smoothing_length(), D);
-        let seen = |place: &Vector<D>| frame.faces.sight(particles, settings.particle_spacing, &solid, point, place);
-        shape_functions(&near, radius, particles, point, |place: &Vector<D>, distance| seen(place) * kernel.value(distance))
-    })?;
-    let pressure = near.iter().zip(&weights).map(|(&j, w)| pressure[j] * w).sum();
-    let velocity = near.iter().zip(&weights).map(|(&j, w)| particles.velocity[j] * *w).sum();
-    Some((pressure, velocity))
-}
-
-/// The weight of each particle in `near` in the interpolated value: that of the fit of a quadratic field or, where that would make too much
-/// of what the particles differ by, as far outside, of a linear one, or of the mean.
-fn shape_functions<const D: usize>(
-    near: &[usize],
-    radius: f64,
-    particles: &Particles<D>,
-    point: &Vector<D>,
-    weight: impl Fn(&Vector<D>, f64) -> f64,
-) -> Option<Vec<f64>> {
-    let away: Vec<_> = near.iter().map(|&j| (particles.position[j] - point) / radius).collect();
-    let weights: Vec<f64> =
-        near.iter().zip(&away).map(|(&j, away)| weight(&particles.position[j], radius * away.norm())).collect();
-    let total: f64 = weights.iter().sum();
-    if total <= 0.0 {
-        return None;
-    }
-    // r_k, then r_k r_l.
-    let functions = |r: &Vector<D>, count: usize| {
-        let products = (0..D).flat_map(|k| (0..=k).map(move |l| r[k] * r[l]));
-        DVector::from_iterator(count, r.iter().copied().chain(products).take(count))
+    let slope = |&j: &usize| {
+        let slope = pressure.slope[frame.images.source(particles.real, j)];
+        slope.map(|slope| frame.images.at_source(particles.real, j, slope))
     };
-    let fits = [D * (D + 3) / 2, D].map(|count| {
-        let functions: Vec<_> = away.iter().map(|r| functions(r, count)).collect();
-        fit(&functions, &weights, total)
-    });
-    let sound = |fit: &Vec<f64>| fit.iter().map(|weight| weight.abs()).sum::<f64>() < LARGEST_AMPLIFICATION;
-    let [(quadratic, all_told), (linear, _)] = fits;
-    let fitted = if all_told && sound(&quadratic) { quadratic } else { linear };
-    Some(if sound(&fitted) { fitted } else { weights.iter().map(|w| w / total).collect() })
+    let around = Around {
+        radius: settings.support_radius(),
+        spacing: settings.particle_spacing,
+        away: near.iter().map(|&j| particles.position[j] - point).collect(),
+        weights: with_kernel!(settings.kernel, kernel => {
+            let kernel = Smoothing::new(kernel, settings.smoothing_length(), D);
+            let seen = |j: usize| frame.faces.sight(particles, settings.particle_spacing, &solid, point, &particles.position[j]);
+            near.iter().map(|&j| seen(j) * kernel.value((particles.position[j] - point).norm())).collect()
+        }),
+    };
+    let slopes: Vec<_> = near.iter().map(slope).collect();
+    let of_pressure = around.weigh(&slopes)?;
+    let of_velocity = around.weigh(&vec![None; near.len()])?;
+    let values = near.iter().zip(&of_pressure.value).map(|(&j, w)| pressure.value[j] * w).sum::<f64>();
+    let gradients = slopes.iter().zip(&of_pressure.gradient).map(|(slope, w)| slope.map_or(0.0, |s| s.gradient.dot(w)));
+    let velocity = near.iter().zip(&of_velocity.value).map(|(&j, w)| particles.velocity[j] * *w).sum();
+    Some((values + gradients.sum::<f64>(), velocity))
 }
 
-/// What each value counts in the value at the point of the least-squares fit of one and functions that vanish there; and whether the
-/// particles tell of all of these: those that too few, or collinear ones, do not tell of are taken as zero.
-fn fit(functions: &[DVector<f64>], weights: &[f64], total: f64) -> (Vec<f64>, bool) {
-    let count = functions[0].len();
-    // About the mean, where the fit is the mean of the values whatever its coefficients.
-    let mean = functions.iter().zip(weights).fold(DVector::zeros(count), |mean, (f, w)| mean + f * (w / total));
-    let mut moments = DMatrix::zeros(count, count);
-    for (f, w) in functions.iter().zip(weights) {
-        let deviation = f - &mean;
-        moments.ger(*w, &deviation, &deviation, 1.0);
+/// What the value of each particle, and its gradient, count in an interpolated value.
+struct Weights<const D: usize> {
+    value: Vec<f64>,
+    gradient: Vec<Vector<D>>,
+}
+
+/// The fluid around a point.
+struct Around<const D: usize> {
+    radius: f64,
+    spacing: f64,
+    /// Where the particles are, from the point.
+    away: Vec<Vector<D>>,
+    /// What they count in a fit.
+    weights: Vec<f64>,
+}
+
+impl<const D: usize> Around<D> {
+    /// The weights of the fit of a quadratic field to values and, where there are, slopes or, where that would make too much of what
+    /// the particles differ by, as far outside, of a linear one, or of the mean.
+    fn weigh(&self, slopes: &[Option<Slope<D>>]) -> Option<Weights<D>> {
+        let total: f64 = self.weights.iter().sum();
+        if total <= 0.0 {
+            return None;
+        }
+        let sound = |fit: &Weights<D>| {
+            let of_gradients: f64 = fit.gradient.iter().map(|w| w.norm()).sum();
+            fit.value.iter().map(|w| w.abs()).sum::<f64>() + of_gradients / self.spacing < LARGEST_AMPLIFICATION
+        };
+        let (quadratic, all_told) = self.fit(D * (D + 3) / 2, slopes, total);
+        let fitted = if all_told && sound(&quadratic) { quadratic } else { self.fit(D, slopes, total).0 };
+        Some(if sound(&fitted) {
+            fitted
+        } else {
+            let value = self.weights.iter().map(|w| w / total).collect();
+            Weights { value, gradient: vec![Vector::zeros(); slopes.len()] }
+        })
     }
-    // Not by singular values: nalgebra's are wrong by 4e-4 for some matrices of three dimensions.
-    let SymmetricEigen { eigenvalues, eigenvectors } = moments.symmetric_eigen();
-    let told = eigenvalues.map(|value| if value > 1e-6 * total { 1.0 / value } else { 0.0 });
-    let slope = &eigenvectors * (eigenvectors.transpose() * &mean).component_mul(&told);
-    let counts = functions.iter().zip(weights).map(|(f, w)| w * (1.0 / total - (f - &mean).dot(&slope))).collect();
-    (counts, told.iter().all(|told| *told > 0.0))
+
+    /// The weights of the least-squares fit of one and `count` functions that vanish at the point; and whether the particles tell of
+    /// all of these: those that too few, or collinear ones, do not tell of are taken as zero.
+    fn fit(&self, count: usize, slopes: &[Option<Slope<D>>], total: f64) -> (Weights<D>, bool) {
+        let span = GRADIENT_SPAN * self.spacing;
+        let functions: Vec<_> = self.away.iter().map(|r| self.functions(r, count)).collect();
+        // Along each axis what the slopes say of the functions, beside what they say of the field, both times `span`.
+        let derivatives: Vec<Option<[DVector<f64>; D]>> = slopes
+            .iter()
+            .zip(&self.away)
+            .map(|(slope, r)| slope.as_ref().map(|slope| self.derivatives(r, &slope.bend, count).map(|row| row * span)))
+            .collect();
+        // About the mean, where the fit is the mean of the values whatever its coefficients.
+        let mean = functions.iter().zip(&self.weights).fold(DVector::zeros(count), |mean, (f, w)| mean + f * (w / total));
+        let mut moments = DMatrix::zeros(count, count);
+        for ((f, rows), w) in functions.iter().zip(&derivatives).zip(&self.weights) {
+            let deviation = f - &mean;
+            moments.ger(*w, &deviation, &deviation, 1.0);
+            rows.iter().flatten().for_each(|row| moments.ger(*w, row, row, 1.0));
+        }
+        // Not by singular values: nalgebra's are wrong by 4e-4 for some matrices of three dimensions.
+        let SymmetricEigen { eigenvalues, eigenvectors } = moments.symmetric_eigen();
+        let told = eigenvalues.map(|value| if value > 1e-6 * total { 1.0 / value } else { 0.0 });
+        let slope = &eigenvectors * (eigenvectors.transpose() * &mean).component_mul(&told);
+        let value = functions.iter().zip(&self.weights).map(|(f, w)| w * (1.0 / total - (f - &mean).dot(&slope))).collect();
+        let of_gradient = |(rows, w): (&Option<[DVector<f64>; D]>, &f64)| {
+            rows.as_ref().map_or_else(Vector::zeros, |rows| Vector::from_fn(|m, _| -w * span * rows[m].dot(&slope)))
+        };
+        let gradient = derivatives.iter().zip(&self.weights).map(of_gradient).collect();
+        (Weights { value, gradient }, told.iter().all(|told| *told > 0.0))
+    }
+
+    /// The first `count` of r_k, then r_k r_l, in radii.
+    fn functions(&self, r: &Vector<D>, count: usize) -> DVector<f64> {
+        let r = r / self.radius;
+        let products = pairs::<D>().map(|(k, l)| r[k] * r[l]);
+        DVector::from_iterator(count, r.iter().copied().chain(products).take(count))
+    }
+
+    /// What a slope with this `bend` says of these functions along each axis.
+    fn derivatives(&self, r: &Vector<D>, bend: &[Matrix<D>; D], count: usize) -> [DVector<f64>; D] {
+        std::array::from_fn(|m| {
+            let along = |k: usize| f64::from(k == m);
+            let products = pairs::<D>().map(|(k, l)| along(k) * r[l] + along(l) * r[k] + bend[k][(m, l)]);
+            let rows = (0..D).map(|k| along(k) * self.radius).chain(products);
+            DVector::from_iterator(count, rows.map(|row| row / self.radius.powi(2)).take(count))
+        })
+    }
+}
+
+/// Every two axes, once.
+fn pairs<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
+    (0..D).flat_map(|k| (0..=k).map(move |l| (k, l)))
 }

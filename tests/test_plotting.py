@@ -392,6 +392,19 @@ def test_outlines_turn_with_the_body(tmp_path):
     assert np.sign(run.snapshot().solid(inner)).tolist() == [-1, 1]
 
 
+def test_a_long_legend_takes_nothing_from_panels_and_title():
+    widths = []
+    for label in ("a", "a label that is longer than most of those that there are, by far"):
+        figure = plotting.panels({"y": [Curve(label, [0, 1], [0, 1])]}, "x")
+        plotting.head(figure, "cylinder, Re = 200, resolution = 20")
+        figure.draw_without_rendering()
+        (legend,) = figure.legends
+        widths.append(figure.axes[0].get_window_extent().width / figure.dpi)
+        assert figure.get_suptitle() and figure._suptitle.get_window_extent().x1 < legend.get_window_extent().x0
+        assert legend.get_window_extent().x1 < figure.bbox.x1
+    assert widths[1] == pytest.approx(widths[0], rel=0.2)
+
+
 def test_a_curve_has_one_colour_in_all_panels():
     first = [Curve("alsph", [0.3, 0.6], [1, 2]), Curve("isph", [0.4], [2])]
     figure = plotting.panels({"a": first, "b": first[1:]}, "cost", ("x", "y"))

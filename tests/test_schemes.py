@@ -219,15 +219,16 @@ def test_the_pressure_that_is_shown_is_what_pushes_smooth(options):
         return
     kept = case.restored({name: value for name, value in state.items() if name != "unkept_pressure"})
     assert (kept.snapshot()["pressure"] == state["pressure"]).all()
-    # Sums over all particles of the fluid that are not beside the mirrors.
+    # Sums over the fluid around all particles that are not beside the mirrors; solids far from it have none.
     position, flows = state["position"], state["kind"] != Kind.SOLID
-    inside = flows & (np.abs(position[:, 1]) < 1.3)
+    inside = np.abs(position[:, 1]) < 1.3
     q = np.linalg.norm(position[inside, None] - position[flows], axis=2) / case.settings()["particle_spacing"] * 0.75
     weight = sum(c * np.maximum(k - q, 0) ** 5 for c, k in ((1, 3), (-6, 2), (15, 1)))
-    beside = weight @ state["unkept_pressure"][flows] / weight.sum(axis=1)
-    assert np.abs(beside).max() > 0.01 and not state["unkept_pressure"][~flows].any()
+    beside = weight @ state["unkept_pressure"][flows] / np.maximum(weight.sum(axis=1), 1e-300)
+    for some in (flows, ~flows):
+        assert np.abs(beside[some[inside]]).max() > 0.01
+    assert not state["unkept_pressure"][~flows].any()
     assert shown["pressure"][inside] == pytest.approx(state["pressure"][inside] + beside, abs=1e-6)
-    assert (shown["pressure"][~flows] == state["pressure"][~flows]).all()
     # A sample is a fit of what is shown, and the same of a state that goes on.
     taken = case.restored(state | {"pressure": shown["pressure"], "unkept_pressure": 0 * state["pressure"]})
     assert taken.sample(points)["pressure"] == pytest.approx(sampled, abs=1e-12)

@@ -105,6 +105,12 @@ impl Settings {
         self.free_surface.is_none() && !matches!(self.scheme, SchemeSettings::Wcsph { .. } | SchemeSettings::Edac { .. })
     }
 
+    /// Whether the pressure errs from layer to layer next to walls, so that a sample of it follows its gradient, too: in every scheme but
+    /// ALSPH, whose sum of many small corrections is smooth. Beside a free surface gradients are formed otherwise.
+    pub fn pressure_alternates(&self) -> bool {
+        self.free_surface.is_none() && !matches!(self.scheme, SchemeSettings::Alsph)
+    }
+
     /// Radius beyond which the kernel vanishes.
     pub fn support_radius(&self) -> f64 {
         self.kernel.support() * self.smoothing_length()

@@ -12,7 +12,7 @@ use crate::discretisation::VelocityGradient;
 use crate::flow::{Flow, Step};
 use crate::forcing::Forcing;
 use crate::frame::Travel;
-use crate::interpolation::{interpolate, is_near, smooth_acting_pressure};
+use crate::interpolation::{ActingPressure, interpolate, smooth_acting_pressure};
 use crate::loads::loads;
 use crate::motion::{NUMBERS, Pose};
 use crate::particles::{ParticleKind, Particles, Place};
@@ -351,9 +351,11 @@ impl<const D: usize> Simulation<D> {
     pub fn sample(&mut self, points: &[Vector<D>]) -> Vec<(f64, Vector<D>)> {
         self.on_pool(|simulation| {
             simulation.prepare();
+            if simulation.settings.pressure_alternates() {
+                simulation.flow.frame.stencil.correct();
+            }
             let Self { settings, flow: Flow { particles, frame, .. }, .. } = &*simulation;
-            let wanted = is_near(settings, particles, frame, points);
-            let pressure = smooth_acting_pressure(settings, particles, frame, |i| wanted[i]);
+            let pressure = ActingPressure::near(settings, particles, frame, points);
             let mut values = vec![(f64::NAN, Vector::repeat(f64::NAN)); points.len()];
             parallel::for_each(&mut values, |k, value| {
                 if let Some(sample) = interpolate(settings, particles, frame, &pressure, &points[k]) {

@@ -150,7 +150,7 @@ def scheme(name: str | None, wall_pressure: str) -> list[str]:
     """Remark on a scheme with which hardly anything has been compared, and on walls at which its sound grows."""
     if name in (None, "alsph"):
         return []
-    wrong = "; C_p on a cylinder erred by 0.27, by half of that with pressure_share = 0.5" if name == "isph" else ""
+    wrong = "; C_p on a cylinder erred by 0.13" if name == "isph" else ""
     compared = f"other scheme: {name} has been compared with references in few flows, see docs/schemes.md{wrong}"
     if wall_pressure != "linear" or name not in ("wcsph", "edac"):
         return [compared]

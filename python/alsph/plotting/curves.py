@@ -15,7 +15,7 @@ from alsph.analysis.probes import GaugeRecord, Probes
 from alsph.analysis.window import DEVELOPING
 from alsph.arrays import AXES, FloatArray
 from alsph.geometry.surface import Surface
-from alsph.plotting.style import MARKERS, PALETTE, TIME_LABEL, blank, line, nothing_to_draw
+from alsph.plotting.style import MARKERS, PALETTE, TIME_LABEL, blank, legend_beside, line, nothing_to_draw
 from alsph.text import in_figure
 
 if TYPE_CHECKING:
@@ -177,7 +177,7 @@ def probes(record: Probes) -> Figure:
     if not shown:
         nothing_to_draw(figure, "no probes")
         return figure
-    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside right upper", fontsize="small", frameon=False)
+    legend_beside(figure, *grid[0].get_legend_handles_labels())
     return figure
 
 
@@ -259,7 +259,7 @@ def panels(panels: dict[str, list[Curve]], label: str, logarithmic: Sequence[str
     named = {
         text: handle for axes in figure.axes for handle, text in zip(*axes.get_legend_handles_labels(), strict=True)
     }
-    figure.legend([*named.values()], [*named], loc="outside right upper", fontsize="small", frameon=False)
+    legend_beside(figure, [*named.values()], [*named])
     return figure
 
 
@@ -290,5 +290,5 @@ def convergence(errors: dict[str, dict[int, float]]) -> Figure:
     axes.set_xticks(resolutions, [str(resolution) for resolution in resolutions])
     axes.xaxis.minorticks_off()
     axes.grid(alpha=0.3, which="both")
-    figure.legend(loc="outside right upper", fontsize="small", frameon=False)
+    legend_beside(figure, *axes.get_legend_handles_labels())
     return figure

@@ -17,7 +17,9 @@ from alsph.symbols import GENERAL, Symbols
 from alsph.text import in_figure
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
 
 
 TIME_LABEL = "$tU/D$"
@@ -27,6 +29,9 @@ PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#5
 
 MARKERS = "osD^v<>pPX"
 """What tells curves apart in print, and to who sees no colours."""
+
+BESIDE = "beside"
+"""Identifies legends on the right of the panels, which a title does not stand above."""
 
 MARKED = 8
 """Number of markers of a curve that has a point a step."""
@@ -108,8 +113,21 @@ def title(flows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def head(figure: Figure, title: str) -> None:
-    """Write what a figure is of above it."""
-    figure.suptitle(title, fontsize="medium")
+    """Write what a figure is of above its panels."""
+    beside = sum(_width(figure, legend) for legend in figure.legends if legend.get_gid() == BESIDE)
+    figure.suptitle(title, fontsize="medium", x=0.5 - 0.5 * beside / figure.get_figwidth())
+
+
+def legend_beside(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> None:
+    """Put a legend on the right of the panels, which stay as wide as they are beside one of 1.5 inches."""
+    legend = figure.legend(handles, labels, loc="outside right upper", fontsize="small", frameon=False)
+    legend.set_gid(BESIDE)
+    figure.set_figwidth(figure.get_figwidth() + max(0.0, _width(figure, legend) - 1.5))
+
+
+def _width(figure: Figure, legend: Legend) -> float:
+    """Return the width of a legend of a figure [inch]."""
+    return float(legend.get_window_extent().width / figure.dpi)
 
 
 def rename(figure: Figure, symbols: Symbols) -> None:
