@@ -9,6 +9,8 @@ use crate::kernel::{Smoothing, with_kernel};
 use crate::particles::{ParticleKind, Particles};
 use crate::settings::Settings;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// Largest sum of the moduli of the weights of a fit, whose sum is one.
 const LARGEST_AMPLIFICATION: f64 = 8.0;
@@ -45,7 +47,7 @@ pub fn smooth_acting_pressure<const D: usize>(
 /// The pressure that acts near some points, of particles and images, and where it alternates how it changes there, of real particles.
 pub struct ActingPressure<const D: usize> {
     value: Vec<f64>,
-    slope: Vec<Option<Slope<D>>>,
+    slope: HashMap<usize, Slope<D>>,
 }
 
 impl<const D: usize> ActingPressure<D> {
@@ -55,21 +57,17 @@ impl<const D: usize> ActingPressure<D> {
         for point in points {
             for_each_near(settings, particles, frame, point, |j| near[frame.images.source(particles.real, j)] = true);
         }
-        let slopes = settings.pressure_alternates();
+        let mut sloped = Vec::new();
         let mut wanted = near.clone();
-        if slopes {
-            for i in (0..particles.real).filter(|&i| near[i]) {
+        if settings.pressure_alternates() {
+            sloped = parallel::filter(particles.real, |i| near[i] && particles.kind[i] != ParticleKind::Solid);
+            for &i in &sloped {
                 let row = frame.stencil.neighbours.row(i).0;
                 row.all().iter().for_each(|entry| wanted[frame.images.source(particles.real, entry.j())] = true);
             }
         }
         let value = smooth_acting_pressure(settings, particles, frame, |i| wanted[i]);
-        let mut slope = vec![None; particles.real];
-        parallel::for_each(&mut slope, |i, slope| {
-            if slopes && near[i] && particles.kind[i] != ParticleKind::Solid {
-                *slope = Slope::of(&frame.stencil, &value, i);
-            }
-        });
+        let slope = sloped.into_par_iter().filter_map(|i| Some((i, Slope::of(&frame.stencil, &value, i)?))).collect();
         Self { value, slope }
     }
 }
@@ -137,8 +135,8 @@ pub fn interpolate<const D: usize>(
         if particles.kind[j] == ParticleKind::Solid { solid.push(j) } else { near.push(j) }
     });
     let slope = |&j: &usize| {
-        let slope = pressure.slope[frame.images.source(particles.real, j)];
-        slope.map(|slope| frame.images.at_source(particles.real, j, slope))
+        let slope = pressure.slope.get(&frame.images.source(particles.real, j));
+        slope.map(|slope| frame.images.at_source(particles.real, j, *slope))
     };
     let around = Around {
         radius: settings.support_radius(),
