@@ -281,7 +281,8 @@ class Simulation:
     def sample(self, points: FloatArray) -> dict[str, FloatArray]:
         """Return the fluid's ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d); NaN far from all fluid.
 
-        The pressure is that of :meth:`snapshot`.
+        They are quadratic fits. The pressure is that of :meth:`snapshot`; in other schemes than ``alsph``, where it
+        errs from layer to layer at walls, the fit follows its gradient, too.
         """
         with self._engine() as engine:
             found = engine.sample(exact("points", points, np.float64, 2))
