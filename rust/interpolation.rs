@@ -149,8 +149,9 @@ pub fn interpolate<const D: usize>(
         }),
     };
     let slopes: Vec<_> = near.iter().map(slope).collect();
-    let of_pressure = around.weigh(&slopes)?;
     let of_velocity = around.weigh(&vec![None; near.len()])?;
+    let has_slopes = slopes.iter().any(Option::is_some);
+    let of_pressure = if has_slopes { &around.weigh(&slopes)? } else { &of_velocity };
     let values = near.iter().zip(&of_pressure.value).map(|(&j, w)| pressure.value[j] * w).sum::<f64>();
     let gradients = slopes.iter().zip(&of_pressure.gradient).map(|(slope, w)| slope.map_or(0.0, |s| s.gradient.dot(w)));
     let velocity = near.iter().zip(&of_velocity.value).map(|(&j, w)| particles.velocity[j] * *w).sum();
