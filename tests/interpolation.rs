@@ -207,9 +207,9 @@ fn the_pressure_that_acts_is_smooth() {
 
 #[test]
 fn where_no_fluid_is_near_there_is_no_value() {
-    // One particle with a support radius of 0.4: all that is known are its own values.
+    // One particle that is told of up to 0.15: all that is known are its own values.
     let lone = Vector::from([0.5, 0.5]);
-    let points = [[0.5, 0.5], [0.5, 0.89], [0.5, 0.91], [f64::NAN, 0.5], [0.5, f64::INFINITY]].map(Vector::from);
+    let points = [[0.5, 0.5], [0.5, 0.649], [0.5, 0.651], [f64::NAN, 0.5], [0.5, f64::INFINITY]].map(Vector::from);
     let values = sampled(linear, 0.1, common::particles(vec![lone]), &points);
     for (p, u) in values.chunks(points.len()).flat_map(|values| &values[..2]) {
         assert_relative_eq!(*p, linear(&lone).0, epsilon = 1e-12);

@@ -82,10 +82,21 @@ def test_a_measure_that_is_nan_is_told_with_its_run_and_why(tmp_path):
     assert report.gaps[0] in (report.path / "convergence.md").read_text()
 
 
-def test_an_error_is_not_extrapolated_below_zero():
-    found = grid_convergence("error", [10, 14, 20], [0.30, 0.265, 0.23], 0.0)
-    assert found.kind == "monotonic" and math.isnan(found.richardson) and math.isnan(found.order)
-    assert grid_convergence("error", [10, 20, 40], [0.4, 0.1, 0.025], 0.0).order == pytest.approx(2.0, abs=1e-6)
+@pytest.mark.parametrize(
+    ("errors", "kind", "order"),
+    [
+        ([0.30, 0.265, 0.23], "monotonic", math.log(0.265 / 0.23) / math.log(20 / 14)),
+        ([0.12249, 0.014977, 0.0054354], "monotonic", 2.842),
+        ([-0.4, -0.1, -0.05], "monotonic", 1.943),
+        ([0.4, 0.1, -0.05], "oscillating", math.nan),
+        ([0.4, 0.1, 0.2], "oscillating", math.nan),
+        ([0.1, 0.2, 0.3], "diverging", math.nan),
+    ],
+)
+def test_the_order_of_an_error_is_that_at_which_the_last_two_go_to_zero(errors, kind, order):
+    found = grid_convergence("error", [10, 14, 20], errors, 0.0)
+    assert found.kind == kind and found.order == pytest.approx(order, rel=1e-3, nan_ok=True)
+    assert math.isnan(found.richardson) and math.isnan(found.index)
 
 
 def test_changes_within_their_uncertainties_tell_no_order():

@@ -3,6 +3,7 @@
 import builtins
 import io
 import json
+import re
 
 import alsph
 import ezdxf
@@ -157,6 +158,72 @@ def test_what_is_no_outline_is_refused_by_its_file(tmp_path, name, content, mess
     assert str(refusal.value).count(name) >= 1 and "\n" not in str(refusal.value)
     with pytest.raises(ConfigError, match="^shape = "):
         Body(shape=str(tmp_path / name))
+
+
+CIRCLES = {
+    "arcs": ('<path d="M30 50A20 20 0 1 1 70 50A20 20 0 1 1 30 50Z" transform="{}"/>', 400 * np.pi),
+    "circle": ('<circle cx="50" cy="50" r="20" transform="{}"/>', 400 * np.pi),
+    "capsule": ('<path d="M20 20H60A10 10 0 0 1 60 40H20A10 10 0 0 1 20 20Z" transform="{}"/>', 800 + 100 * np.pi),
+    "rounded": ('<rect x="20" y="20" width="60" height="20" rx="10" transform="{}"/>', 800 + 100 * np.pi),
+}
+
+
+@pytest.mark.parametrize("shape", CIRCLES)
+@pytest.mark.parametrize(
+    ("transform", "turn"),
+    [
+        ("skewX(20)", [[1, 0], [np.tan(np.radians(20)), 1]]),
+        ("skewY(10)", [[1, np.tan(np.radians(10))], [0, 1]]),
+        ("scale(2,0.5) rotate(45)", np.sqrt(0.5) * np.array([[2, 0.5], [-2, 0.5]])),
+        ("rotate(45) scale(2,0.5)", np.sqrt(0.5) * np.array([[2, 2], [-0.5, 0.5]])),
+        ("matrix(1.2,0.3,-0.5,0.8,3,4)", [[1.2, 0.3], [-0.5, 0.8]]),
+    ],
+)
+def test_arcs_under_any_transform(tmp_path, shape, transform, turn):
+    element, area = CIRCLES[shape]
+    outline = drawn(tmp_path, "a.svg", SVG.format(element.format(transform)))
+    (body,) = outline.polygons
+    plain = drawn(tmp_path, "b.svg", SVG.format(element.format(""))).polygons[0].exterior.coords
+    turned = np.array(plain) * [1, -1] @ np.array(turn)  # y goes downwards there
+    sides = np.ptp(turned, axis=0)
+    assert np.ptp(body.exterior.coords, axis=0) == pytest.approx(sides / sides.max(), rel=2e-3)
+    extent = float(re.search(r"larger extent is (\S+)", outline.remark)[1])
+    assert body.area * extent**2 == pytest.approx(area * abs(np.linalg.det(turn)), rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("content", "remark"),
+    [
+        ('<clipPath id="c"><circle r="8"/></clipPath><rect width="4" height="2" clip-path="url(#c)"/>', "clip-path"),
+        ('<rect width="4" height="2" transform="rotate(90)" transform-origin="2 1"/>', "transform-origin"),
+        ('<rect width="4" height="2" style="transform: rotate(90deg)"/>', "transform"),
+        ('<style>.a { fill: red; mask: url(#m) }</style><rect class="a" width="4" height="2"/>', "mask"),
+    ],
+)
+def test_what_of_a_drawing_is_not_followed_is_told(tmp_path, content, remark):
+    assert f"not regarded: {remark}, which may cut or move" in drawn(tmp_path, "a.svg", SVG.format(content)).remark
+    plain = '<g transform="rotate(90)"><rect width="4" height="2" style="fill: red"/></g>'
+    assert "not regarded" not in drawn(tmp_path, "b.svg", SVG.format(plain)).remark
+
+
+@pytest.mark.parametrize("way", ['opacity="0"', 'fill="none" stroke="none"', 'fill="none"', 'style="fill:none"'])
+def test_what_a_drawing_lets_nobody_see_is_left_out(tmp_path, way):
+    outline = drawn(tmp_path, "a.svg", SVG.format(f'<rect {way} width="90" height="90"/><rect width="4" height="2"/>'))
+    (body,) = outline.polygons
+    assert body.area == pytest.approx(0.5) and "does not show them: 1 rect" in outline.remark
+    seen = '<rect fill="none" stroke="black" width="4" height="2"/>'
+    assert drawn(tmp_path, "b.svg", SVG.format(seen)).polygons[0].area == pytest.approx(0.5)
+
+
+def test_closed_curves_drawn_twice_are_taken_once(tmp_path):
+    def with_its_hatch(drawing, space):
+        space.add_lwpolyline(SQUARE, close=True)
+        space.add_hatch().paths.add_polyline_path(SQUARE[::-1], is_closed=True)
+
+    (body,) = drawn(tmp_path, "a.dxf", dxf(with_its_hatch)).polygons
+    assert body.area == pytest.approx(1.0)
+    twice = '<circle r="5"/><circle r="5"/>'
+    assert len(drawn(tmp_path, "a.svg", SVG.format(twice)).polygons) == 1
 
 
 def test_a_drawing_that_is_too_large_or_gone(tmp_path):

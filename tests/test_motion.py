@@ -107,8 +107,29 @@ def test_points_of_the_surface_and_moments_go_along_with_the_body(tmp_path):
     assert found == pytest.approx(2 * (pressure - rows["inlet_pressure"][-1]))
 
     run = case.run(tmp_path / "run", until=1.0, progress=False)
-    drag, own = run.history["drag_coefficient"][-1], run.moment_coefficient(about=(2.0, 0.0))[-1]
-    assert run.moment_coefficient(about=(1.5, 0.0))[-1] - own == pytest.approx(0.5 * drag, rel=0.05)
+    history = run.history
+    drag, lift, way = (history[name] for name in ("drag_coefficient", "lift_coefficient", "cylinder_displacement_x"))
+    torque = -2 * (history["cylinder_pressure_torque"] + history["cylinder_viscous_torque"])
+    assert run.moment_coefficient() == pytest.approx(torque)  # about its centre, wherever that is
+    for x, y in ((2.0, 0.0), (1.5, 0.3)):  # points that stay where they are
+        assert run.moment_coefficient(about=(x, y)) == pytest.approx(torque - (2 + way - x) * lift - y * drag)
+
+
+def test_moments_of_several_bodies_are_about_one_point_that_stays(tmp_path):
+    corners = np.array([[-0.4, -0.4], [0.4, -0.4], [0.4, 0.4], [-0.4, 0.4]])
+    shape = [corners, corners + [1.8, 0.6]]
+    case = Body(shape=shape, resolution=8, length=7, height=6, upstream=2.5, body_motion="0.3*t*(x>3), 0, 0.5*t*(x>3)")
+    run = case.run(tmp_path / "run", until=0.6, progress=False)
+    parts = [run.moment_coefficient(body=name, about=case.moment_point) for name in run.bodies]
+    assert len(parts) == 2 and np.abs(parts[1]).max() > 0.01
+    assert run.moment_coefficient() == pytest.approx(parts[0] + parts[1])
+
+
+def test_periods_where_bodies_are_moved_may_be_those_of_the_motion(tmp_path):
+    moved = Cylinder(**SMALL, body_motion="0, 0.2*sin(2*pi*t)").run(tmp_path / "moved", until=8.0, progress=False)
+    assert moved.window.periods and any(remark.startswith("driven: ") for remark in moved.remarks)
+    still = Cylinder(**SMALL, body_motion="0, 0.1*t").run(tmp_path / "still", until=0.2, progress=False)
+    assert not still.window.periods and not any(remark.startswith("driven: ") for remark in still.remarks)
 
 
 @pytest.mark.parametrize(

@@ -188,6 +188,10 @@ def test_bodies_have_forces_of_their_own_that_add_up(tmp_path):
         (SQUARE + "\n0 0\n1 0\n1 1\n0 1\n0 0\n", r"foil\.txt: curves 1 and 2 overlap at"),
         (SQUARE + "\n0.5 -0.5\n1 -0.5\n1 0.5\n0.5 0.5\n0.5 -0.5\n", r"foil\.txt: curves 1 and 2 touch at \(0.5, "),
         (SQUARE + "999 999\n0 0\n.5 0\n0 .1\n", r"foil\.txt: curves 1 and 2 overlap at"),
+        (
+            "0 0\n.5 .1\n1 0\n0 0\n.5 -.1\n1 0\n",
+            r"foil\.txt:.*its first point comes again in line 4: if a side begins there, put a blank line before it",
+        ),
         (rings(*range(1, 13)), r"foil\.txt: curve 1 lies within more than 10 others"),
         ("0 0\n3 0\n3 3\n0 3\n0 0\n1 1\n1 2\n2 2\n2 1\n1 1\n", r"foil\.txt:1: .*meets itself .*a hole"),
     ],

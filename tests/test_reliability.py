@@ -1,5 +1,6 @@
 """Runs that are killed, stopped, moved, damaged or broken down: none is lost, and all end with the same bits."""
 
+import codecs
 import json
 import os
 import random
@@ -11,6 +12,7 @@ import subprocess
 import sys
 import threading
 import time as clock
+import warnings
 
 import alsph
 import h5py
@@ -402,6 +404,18 @@ def test_a_history_whose_times_do_not_increase_is_refused_and_set_aside(tmp_path
     (path / "history.csv").write_text("".join([*lines[:6], *lines[4:]]))
     with pytest.warns(RuntimeWarning, match="step 4 stands behind step 5.* set aside as history.damaged.csv"):
         resume(path, until=0.2, progress=False)
+
+
+def test_a_history_that_a_spreadsheet_has_saved_goes_on(tmp_path, small):
+    path = small.replace(time_step=0.05).run(tmp_path / "run", until=0.1, progress=False).path
+    content = (path / "history.csv").read_bytes()
+    drag = alsph.open_run(path).history["drag_coefficient"]
+    (path / "history.csv").write_bytes(codecs.BOM_UTF8 + content.replace(b"\n", b"\r\n"))
+    assert (alsph.open_run(path).history["drag_coefficient"] == drag).all()
+    with warnings.catch_warnings(action="error"):
+        run = alsph.open_run(resume(path, until=0.2, progress=False).path)
+    assert (run.history["drag_coefficient"][: len(drag)] == drag).all() and len(run.history["step"]) > len(drag)
+    assert not any(remark.startswith("incomplete") for remark in run.remarks)
 
 
 @pytest.mark.parametrize("name", ["particles.vtkhdf", "run.log", "run.json", "history.csv", ".history.csv.new"])

@@ -1,3 +1,4 @@
+import json
 import math
 import shutil
 from types import SimpleNamespace
@@ -5,14 +6,16 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
-from alsph import Run
+from alsph import Run, resume
 from alsph.analysis import averages, sampling
 from alsph.analysis.measures import Measure, Profile
-from alsph.cases import Body, Couette, Cylinder, remarks
+from alsph.cases import Body, Couette, Cylinder, TaylorGreen, remarks
 from alsph.config import Config
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
 from alsph.folder.run_folder import RunFolder
+from alsph.geometry.particles import Kind
+from alsph.results import outcome
 from synthetic import CIRCULATION, DRAG, LIFT, STROUHAL, history, signals, write_run
 
 
@@ -56,7 +59,7 @@ def test_summary_and_representations(folder):
     summary = run.summary()
     assert summary["status"] == "finished" and summary["steps"] == len(run.history["time"])
     assert summary["iterations of a step"] == "5 of at most 2, then 4 projection sweeps"
-    assert summary["largest velocity divergence, |∇·u| D/U"] == pytest.approx(0.5)
+    assert summary["mean of the largest velocity divergence, |∇·u| D/U"] == pytest.approx(0.5)
     assert (summary["Reynolds number"], summary["resolution, D/Δx"]) == (200, 10)
     assert "message" not in summary and "mean drag coefficient, reference" not in summary
     assert repr(run).endswith("cylinder, finished, tU/D = 60.03)")
@@ -292,7 +295,8 @@ def test_the_summary_of_a_run(folder):
         "averaging rule": window.rule,
         "shedding periods": str(window.periods),
         "mean velocity divergence, |∇·u| D/U": "0.0005",
-        "largest velocity divergence, |∇·u| D/U": "0.5",
+        "mean velocity divergence at the end of a step, |∇·u| D/U": "0",
+        "mean of the largest velocity divergence, |∇·u| D/U": "0.5",
         "artificial Mach number of the penalty": f"{np.mean(1.5 * run.history['time_step'] ** 0.5):.6g}",
     }
     assert list(shown.items())[: len(expected)] == list(expected.items())
@@ -421,3 +425,90 @@ def test_a_run_without_a_process_is_stopped(damaged, monkeypatch, status):
     assert Run(damaged).status == "finished" and "message" not in Run(damaged).info
     (damaged / "run.json").write_text("{}")
     assert Run(damaged).status == "unknown"
+
+
+def test_a_run_is_that_of_its_folder_wherever_the_process_has_gone(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(folder.parent)
+    run = Run(folder.name)
+    monkeypatch.chdir(tmp_path)
+    assert run.history["time"][-1] > 60 and run.snapshot().time == 60 and run.config.case.reynolds == 200
+    assert str(run.path) == folder.name
+
+
+def test_a_run_does_not_mix_with_another_that_is_made_in_its_folder(tmp_path):
+    first = TaylorGreen(resolution=8).run(tmp_path / "run", until=0.02, progress=False)
+    again = TaylorGreen(resolution=8).run(tmp_path / "run", until=0.04, progress=False, force=True)
+    assert first.history["time"][-1] == again.history["time"][-1]  # of the same flow, and longer
+    TaylorGreen(resolution=10).run(tmp_path / "run", until=0.02, progress=False, force=True)
+    for read in (first.snapshot, again.summary, lambda: first.remarks):
+        with pytest.raises(
+            RunFolderError, match="another run has been made there since this one was opened; open it anew"
+        ):
+            read()
+
+
+def test_a_history_that_was_cut_at_its_end_is_told(damaged):
+    assert not any("incomplete" in remark for remark in Run(damaged).remarks)
+    info = json.loads((damaged / "run.json").read_text())
+    lines = (damaged / "history.csv").read_text().splitlines(True)
+    (damaged / "run.json").write_text(json.dumps(info | {"step": len(lines) - 1}))
+    assert not any("incomplete" in remark for remark in Run(damaged).remarks)
+    (damaged / "history.csv").write_text("".join(lines[:-5]))
+    (told,) = [remark for remark in Run(damaged).remarks if "incomplete" in remark]
+    assert told.startswith(
+        f"incomplete: 5 of {len(lines) - 1} steps are missing in the history, the first behind step "
+    )
+
+
+def test_a_snapshot_is_as_near_as_they_are_to_each_other(folder):
+    run = Run(folder)
+    apart = np.diff(run.times).max()
+    assert run.snapshot(run.times[-1] + 0.9 * apart).time == run.times[-1]
+    for time in (run.times[-1] + 1.1 * apart, run.times[0] - 1.1 * apart):
+        with pytest.raises(ConfigError, match="no snapshot near it"):
+            run.snapshot(time)
+
+
+def test_the_divergence_where_steps_end_is_told_beside_that_of_their_derivatives(tmp_path):
+    case = TaylorGreen(resolution=16, algorithm=2, time_step=0.0508, penalty_constant=100.0, projection_sweeps=0)
+    run = case.run(tmp_path / "run", until=0.4, output_interval=0.05, progress=False)
+    times = [time for time in run.times if run.window.start <= time <= run.window.end]
+    snapshots = [run.snapshot(time) for time in times]
+    ends = [abs(each.velocity_divergence[each.kind == Kind.FLUID]).mean() for each in snapshots]
+    assert run.divergence.at_end == pytest.approx(np.mean(ends)) and len(ends) >= 3
+    assert run.divergence.at_end > 2 * run.divergence.mean
+    assert run.summary()["mean velocity divergence at the end of a step, |∇·u| D/U"] == run.divergence.at_end
+    told = [remark for remark in run.remarks if remark.startswith("not divergence-free")]
+    assert bool(told) == (run.divergence.at_end > outcome.DIVERGENCE)
+    assert all("where steps end" in remark for remark in told)
+    (run.path / "particles.vtkhdf").unlink()
+    without = Run(run.path)
+    assert math.isnan(without.divergence.at_end) and without.divergence.mean == run.divergence.mean
+
+
+def test_parameters_that_were_changed_after_the_run_are_told_and_have_no_reference(tmp_path):
+    case = Cylinder(reynolds=100, resolution=8, length=5, height=4, upstream=2)
+    run = case.run(tmp_path / "run", until=0.05, progress=False)
+    assert not any(remark.startswith("edited") for remark in run.remarks)
+    text = (run.path / "case.toml").read_text()
+    for old, new in (("reynolds = 100.0", "reynolds = 200.0"), ("upstream = 2.0", "upstream = 2.5")):
+        assert old in text
+        (run.path / "case.toml").write_text(text.replace(old, new))
+        edited, change = Run(run.path), f"{old.replace(' =', '')} -> {new.rpartition(' ')[2]}"
+        told = f"edited: case.toml was changed after the run was made: {change}; put it back"
+        assert any(remark.startswith(told) for remark in edited.remarks), edited.remarks
+        assert not any(name.endswith("reference") for name in edited.summary())
+    (run.path / "case.toml").write_text(text.replace("tolerance = 0.001", "tolerance = 0.002"))
+    resumed = resume(run.path, until=0.1, progress=False)
+    assert not any(remark.startswith("edited") for remark in Run(resumed.path).remarks)
+
+
+def test_particles_that_are_not_placed_by_the_spacing_are_told(tmp_path, damaged):
+    assert not any(remark.startswith("packing") for remark in Run(damaged).remarks)
+    lines = [line.split(",") for line in (damaged / "history.csv").read_text().splitlines()]
+    for name, value in (("rms", "0.21"), ("min", "1.1"), ("max", "1.3")):
+        for line in lines[1:]:
+            line[lines[0].index(f"packing_{name}")] = value
+    (damaged / "history.csv").write_text("".join(",".join(line) + "\n" for line in lines))
+    (told,) = [remark for remark in Run(damaged).remarks if remark.startswith("packing")]
+    assert "1.1 to 1.3 times as dense as particles Δx apart, 21 % off" in told

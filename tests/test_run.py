@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 from alsph import config
-from alsph.cases import Cylinder, TaylorGreen
+from alsph.cases import Cylinder, DamBreak, TaylorGreen
 from alsph.engine.simulation import Simulation
 from alsph.errors import ConfigError, Interrupted, RunFolderError, SolverError
 from alsph.folder import run_folder, samples
@@ -307,6 +307,9 @@ def test_prescribed_inflow(small):
     assert (state["velocity"][state["kind"] == 1] == [0.5, 0.0]).all()
     with pytest.raises(ConfigError, match="inflow velocity"):
         simulation.set_inflow(np.zeros((3, 2)))
+    when = rf"t\* = {simulation.time:.4g}".replace(".", r"\.")
+    with pytest.raises(ConfigError, match=rf"inflow: the velocity at \(\S+, \S+\) and {when} is \(nan, 0\); all must"):
+        simulation.set_inflow([np.nan, 0.0])
 
 
 def test_symmetric_flow_has_no_lift(small):
@@ -323,6 +326,22 @@ def test_sample_is_the_uniform_flow_far_from_the_body(small):
     sample = simulation.sample(np.array([[0.3, 1.5], [100.0, 0.0]]))
     assert sample["velocity"][0] == pytest.approx([1, 0], abs=0.01)
     assert np.isnan(sample["pressure"][1])
+
+
+def test_samples_are_of_the_domain_and_of_the_fluid_in_it(small):
+    """Those beyond a periodic side are at the same places within, those beyond others, or deep in bodies, nowhere."""
+    vortices = TaylorGreen(resolution=20).simulation()
+    vortices.run_until(0.1)
+    within, beyond = (vortices.sample(np.array([[x, 0.3], [0.3, x]])) for x in (0.15, 1.15))
+    for name, values in within.items():
+        assert values == pytest.approx(beyond[name], abs=1e-12) and np.isfinite(values).all()
+    spacing = small.particle_spacing
+    inside = small.simulation().sample(np.array([[2.0, 0.0], [2.0 - 0.5 + 1.7 * spacing, 0.0], [2.0, 2.0 + spacing]]))
+    assert np.isnan(inside["pressure"]).all() and np.isnan(inside["velocity"]).all()
+    water = DamBreak(resolution=16).simulation()
+    height = water.state()["position"][:, 1].max() + 1.01 / 16
+    above = water.sample(np.array([[0.5, height], [0.5, height - 0.03]]))["pressure"]
+    assert np.isnan(above).tolist() == [True, False]
 
 
 @pytest.mark.parametrize("algorithm", [1, 2, "original"])

@@ -1,13 +1,15 @@
 """Fields at points and the balance of a box beside direct sums, weighted least squares and integrals by hand."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from alsph.analysis import sampling
 from alsph.errors import ConfigError
+from alsph.geometry.domain import Domain
 from alsph.geometry.lattice import cell_centres, lattice
-from alsph.geometry.particles import Kind
+from alsph.geometry.particles import Kind, Snapshot
 
 SPACING = 0.1
 
@@ -70,6 +72,7 @@ def flow(position, velocity, pressure=0.0, fluid=True):
         velocity=np.broadcast_to(velocity, position.shape),
         pressure=np.broadcast_to(pressure, count),
         fluid=np.broadcast_to(fluid, count),
+        domain=None,
     )
 
 
@@ -142,3 +145,53 @@ def test_faces_of_a_box_in_tiles():
     assert [area for *_, area in faces] == pytest.approx([0.1, 0.1, 0.09, 0.09])
     assert faces[1][2] == pytest.approx(np.array([[0.45, 1.05], [0.45, 1.15]]))
     assert faces[2][2] == pytest.approx(np.array([[0.045 + 0.09 * k, 1.0] for k in range(5)]))
+
+
+def snapshot_of(position, velocity, pressure, domain):
+    count, kind = len(position), np.full(len(position), Kind.FLUID, np.uint8)
+    return Snapshot(0.0, position, velocity, pressure, np.zeros(count), np.zeros(count), kind, domain=domain)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_a_flow_goes_on_across_periodic_sides_where_another_begins_with_it(dimensions):
+    spacing = 0.05
+    domain = Domain(
+        [0] * dimensions, [1, *[0.5] * (dimensions - 1)], [["periodic"] * 2, *[["slip"] * 2] * (dimensions - 1)]
+    )
+    position = lattice(cell_centres(20, spacing), *[cell_centres(10, spacing)] * (dimensions - 1))
+    wave = np.sin(2 * np.pi * position[:, 0])
+    velocity = np.zeros_like(position)
+    velocity[:, 0] = wave
+    run = SimpleNamespace(path="other", spacing=spacing, times=np.ones(1))
+    run.snapshot = lambda time=None: snapshot_of(position, velocity, wave, domain)
+    points = np.full((40, dimensions), 0.25)
+    points[:, 0] = np.linspace(0.0, 1.0, 40)
+    zeros = np.zeros(40)
+    state = {"position": points, "velocity": 0 * points, "pressure": zeros, "kind": np.full(40, Kind.FLUID, np.uint8)}
+    exact = np.sin(2 * np.pi * points[:, 0])
+    began = sampling.initial_state(state, run)
+    assert began["velocity"][:, 0] == pytest.approx(exact, abs=3e-3)
+    assert began["pressure"] == pytest.approx(exact, abs=3e-3)
+    assert sampling.late_velocity(run, points)[:, 0] == pytest.approx(exact, abs=3e-3)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_in_the_air_above_water_there_is_no_value(dimensions):
+    spacing, depth = 0.05, 0.5
+    domain = Domain([0] * dimensions, [1.0] * dimensions, [*[["slip"] * 2] * (dimensions - 1), ["slip", "air"]])
+    position = lattice(*[cell_centres(20, spacing)] * (dimensions - 1), cell_centres(10, spacing))
+    snapshot = snapshot_of(position, np.ones_like(position), depth - position[:, -1], domain)
+
+    def pressure(height, across=0.5):
+        found = sampling.at(snapshot, np.array([[*[across] * (dimensions - 1), height]]), spacing, domain)
+        assert np.isnan(found["velocity"]).all() == np.isnan(found["pressure"]).all()
+        return float(found["pressure"][0])
+
+    for across in (0.0, 0.01, 0.5, 1.0):
+        for height in (0.0, 0.02, 0.25, 0.49):
+            assert pressure(height, across) == pytest.approx(
+                depth - height, abs=1e-9 if dimensions == 2 or across == 0.5 else 0.03
+            )
+        for height in (depth + 0.5 * spacing, depth + 0.9 * spacing, depth + 2 * spacing, 1.0):
+            assert math.isnan(pressure(height, across))
+    assert pressure(depth + 0.2 * spacing, 0.525) == pytest.approx(0.0, abs=1e-9)

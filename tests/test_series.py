@@ -96,9 +96,7 @@ def test_gauges_that_were_moved_do_not_go_on_in_the_file_of_the_former_ones(tmp_
         )
         with pytest.raises(RunFolderError, match="gauges.csv: it holds depth at x = 0.2"):
             _ = alsph.open_run(run.path).gauges
-    with pytest.warns(
-        RuntimeWarning, match="gauges.csv is damaged .*at other places.* set aside as gauges.damaged.csv"
-    ):
+    with pytest.warns(RuntimeWarning, match="gauges.csv holds .*at other places and is set aside as gauges.former.csv"):
         later = alsph.resume(run.path, until=0.4, progress=False)
     assert later.gauges.position.tolist() == [[0.2]] and later.gauges.time.min() > 0.2
 

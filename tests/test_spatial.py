@@ -283,6 +283,21 @@ def test_the_drag_of_a_sphere_is_the_momentum_that_it_takes(tmp_path):
     assert run.summary()["case"] == "sphere"
 
 
+def test_a_mesh_far_from_the_origin_keeps_its_shape():
+    far = Mesh.of(BALL.copy().apply_translation((5e6, 5e5, 0)))
+    assert far.surface.volume == pytest.approx(BALL.volume, rel=1e-6)
+    distances = [Body3D(shape=mesh)._volume.distance(np.zeros((1, 3)))[0] for mesh in (far, Mesh.of(BALL))]
+    assert distances[0] == pytest.approx(distances[1], rel=1e-6)
+    near = Mesh.of(BALL.copy().apply_translation((0.3, 0, 0)))
+    assert max(len(line) for line in near.triangles.splitlines()) < 3 * 16
+
+
+def test_a_mesh_that_crosses_itself_is_told():
+    spindle = Mesh.of(trimesh.creation.torus(0.15, 0.3))
+    assert "pairs of its triangles cross, as near (" in spindle.remark and "may be taken for fluid" in str(spindle)
+    assert not Mesh.of(trimesh.creation.torus(0.3, 0.1)).remark and not Mesh.of(BOX).remark
+
+
 def test_a_mesh_of_one_shell_is_kept_as_it_was_by_older_versions():
     """A run that goes on with one is otherwise one that was changed on its way."""
     assert set(Body3D(shape=BALL).shape.model_dump()) == {"file", "sha256", "triangles"}

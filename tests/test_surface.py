@@ -138,9 +138,11 @@ def test_samples_at_other_points_are_set_aside(tmp_path):
     folder = RunFolder(tmp_path / "run")
     folder.create(Config(Cylinder()))
     append_surface(folder, 0.1, {"angle": np.array([0.0, 90.0])}, np.zeros(2))
-    with pytest.warns(RuntimeWarning, match="holds samples at other points"):
+    with pytest.warns(
+        RuntimeWarning, match="surface.h5 holds samples at other points and is set aside as surface.former"
+    ):
         append_surface(folder, 0.2, {"angle": np.array([0.0, 80.0]), "part": np.zeros(2)}, np.ones(2))
-    assert (tmp_path / "run" / "surface.damaged.h5").exists()
+    assert (tmp_path / "run" / "surface.former.h5").exists()
     with h5py.File(tmp_path / "run" / "surface.h5") as file:
         assert file["time"][:].tolist() == [0.2] and "part" in file
 

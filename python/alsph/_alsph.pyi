@@ -66,7 +66,7 @@ class Simulation:
     def sample(self, points: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         """Fluid ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d), by quadratic moving least squares.
 
-        NaN without neighbours.
+        NaN where the nearest fluid that is seen from there is more than 1.5 Δx away, beside a free surface Δx.
         """
 
     def inflow_position(self) -> NDArray[np.float64]:

@@ -28,6 +28,10 @@ class DamagedError(RunFolderError):
     """A file does not hold what was written to it."""
 
 
+class OtherPointsError(AlsphError, ValueError):
+    """A file holds samples at other points than those that are asked for."""
+
+
 class SolverError(AlsphError, RuntimeError):
     """The computation broke down; the message names step, time, particle, position and field."""
 

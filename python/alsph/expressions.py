@@ -140,8 +140,10 @@ class VectorExpression:
                             )
                     elif len(node.args) != wanted:
                         raise ValueError(f"{node.func.id} takes {wanted} arguments, not {len(node.args)}")
-            if wrong:
-                raise ValueError(f"{shown(ast.unparse(node))} cannot be used in an expression")
+            strange = [own for own in ast.iter_child_nodes(node) if not isinstance(own, ALLOWED)]
+            if wrong or any(not ast.unparse(own) for own in strange):  # an operator is told with what it stands between
+                power = "; write ** for a power" if any(isinstance(own, ast.BitXor) for own in strange) else ""
+                raise ValueError(f"{shown(ast.unparse(node))} cannot be used in an expression{power}")
 
     def _check_name(self, name: str) -> None:
         known = [*"xyz"[: self.components], "t", *self._names]

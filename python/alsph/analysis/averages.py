@@ -136,8 +136,13 @@ class Estimate(float):
             return f"{float(self):.4g} ± unknown"
         if not self.uncertainty > 1e-6 * abs(self):
             return f"{float(self):.6g}"
-        decimals = int(np.clip(1 - np.floor(np.log10(self.uncertainty)), 0, 9))
-        return f"{float(self):.{decimals}f} ± {self.uncertainty:.{decimals}f}"
+        value, decimals = float(self), 1 - math.floor(math.log10(self.uncertainty))
+        if decimals <= 9:
+            return f"{value:.{max(decimals, 0)}f} ± {self.uncertainty:.{max(decimals, 0)}f}"
+        power = math.floor(math.log10(max(abs(value), self.uncertainty)))
+        return " ± ".join(
+            f"{each / 10.0**power:.{decimals + power}f}e{power:03d}" for each in (value, self.uncertainty)
+        )
 
     __str__ = __repr__
 

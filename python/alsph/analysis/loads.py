@@ -39,13 +39,17 @@ class Divergence:
     Attributes
     ----------
     mean, sum, max : Estimate
-        Time averages of the mean, the sum and the maximum over the particles. The paper's "mean velocity divergence" is
-        ``sum`` times the length of its averaging period.
+        Time averages of the mean, the sum and the maximum over the particles, where a step takes its derivatives: with
+        derivatives before or behind its middle (``algorithm`` 1 and 2, ``shadloo``) not where it ends. The paper's
+        "mean velocity divergence" is ``sum`` times the length of its averaging period.
+    at_end : Estimate
+        The mean over the particles where steps end, of some snapshots in the window; NaN without any.
     """
 
     mean: Estimate
     sum: Estimate
     max: Estimate
+    at_end: Estimate
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,9 @@ class Record(Protocol):
     path: Path
     info: dict[str, Any]
 
+    def file(self, name: str) -> Path:
+        """Return a file of the run folder."""
+
     @property
     def status(self) -> str:
         """How far the run is."""

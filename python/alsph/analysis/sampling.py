@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,13 +16,14 @@ from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Kind, Snapshot, neighbour_tree
 
 NEIGHBOURS_PER_DIMENSION = 8
-NEIGHBOURS_AT_WALLS = 16  # the same where walls are mirrors
+NEIGHBOURS_AT_WALLS = 16  # the same where those do not tell all of a fit, and where walls are mirrors
 LARGEST_AMPLIFICATION = 1.5  # sum of the moduli of what particles count in a fit at a wall: 1.2 to 1.4 amid particles
 SINGULAR = 1e-5  # directions that the neighbours determine less well than this are left out of a fit
 CHUNK = 50_000  # points that fields are interpolated to at a time
 REACH = 4.0  # Δx beyond a periodic side that particles are continued to, farther than fits reach
 VOID = 1.5  # points further than this many Δx from every particle have no value
 FILL_WIDTH = 0.7  # of the Gaussian by which the share of space is told that particles fill [Δx]
+DROP = 0.54  # times √d: radius of a particle in the air, how far fluid reaches beyond its outermost particles [Δx]
 
 
 def _nearest(
@@ -66,6 +68,18 @@ def room(points: FloatArray, domain: Domain, spacing: float) -> FloatArray:
     return share
 
 
+def in_air(snapshot: Snapshot, points: FloatArray, spacing: float) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Return which points (m, d) lie beyond a free surface, and the share (m,) of the space there that particles fill.
+
+    Solids, too, fill what is beside a surface. The snapshot's domain is known.
+    """
+    assert snapshot.domain is not None
+    around, _ = with_images(snapshot.position, snapshot.pressure, snapshot.domain, REACH * spacing)
+    filled = fill(around, points, spacing)
+    free = filled < 0.5 * room(points, snapshot.domain, spacing)
+    return free & (distance(around, points) > DROP * np.sqrt(points.shape[1]) * spacing), filled
+
+
 def distance(position: FloatArray, points: FloatArray) -> FloatArray:
     """Distances (m,) of points (m, d) from the nearest particle."""
     return np.asarray(neighbour_tree(position).query(points)[0])
@@ -84,13 +98,11 @@ def at(snapshot: Snapshot, points: FloatArray, spacing: float, domain: Domain) -
 
     See :meth:`alsph.Run.sample`.
     """
-    fluid = snapshot.fluid
-    fields = np.column_stack([snapshot.velocity[fluid], snapshot.pressure[fluid]])
-    lower = np.array(domain.lower)
-    points = np.where(domain.periodic, lower + (points - lower) % domain.size, points)
-    position, fields = with_images(snapshot.position[fluid], fields, domain, REACH * spacing)
-    near = neighbour_tree(position).query(points)[0] <= VOID * spacing
-    seen = near & domain.contains(points, 1e-9 * spacing)
+    points, snapshot = domain.wrapped(points), replace(snapshot, domain=domain)
+    position, fields = _fluid(snapshot, spacing)
+    seen = (distance(position, points) <= VOID * spacing) & domain.contains(points, 1e-9 * spacing)
+    if domain.meets_air:
+        seen[seen] = ~in_air(snapshot, points[seen], spacing)[0]
     values = np.full((len(points), fields.shape[1]), np.nan)
     gradients = np.full((*values.shape, points.shape[1]), np.nan)
     values[seen], gradients[seen] = interpolate_parts(position, fields, points[seen], spacing)
@@ -102,6 +114,13 @@ def at(snapshot: Snapshot, points: FloatArray, spacing: float, domain: Domain) -
         "velocity_gradient": gradients[:, :-1],
         "pressure_gradient": gradients[:, -1],
     }
+
+
+def _fluid(snapshot: Snapshot, spacing: float) -> tuple[FloatArray, FloatArray]:
+    """Return positions of the fluid with its images beyond periodic sides, velocity and pressure side by side."""
+    fluid = snapshot.fluid
+    position, fields = snapshot.position[fluid], np.column_stack([snapshot.velocity[fluid], snapshot.pressure[fluid]])
+    return with_images(position, fields, snapshot.domain, REACH * spacing) if snapshot.domain else (position, fields)
 
 
 def velocity_gradient(snapshot: Snapshot, points: FloatArray, spacing: float) -> FloatArray:
@@ -147,13 +166,24 @@ def interpolate(
     gradients : ndarray, shape (m, k, d)
         Derivative of field k along direction d.
     """
-    distance, index = _nearest(position, points)
-    weight, basis = _basis(distance, position[index] - points[:, None], spacing)
-    moments = np.swapaxes(basis, 1, 2) @ (weight * basis)
-    coefficients = np.linalg.pinv(moments, SINGULAR, hermitian=True) @ (
-        np.swapaxes(basis, 1, 2) @ (weight * values[index])
-    )
+    coefficients, determined = _fit(position, values, points, spacing, NEIGHBOURS_PER_DIMENSION)
+    if not determined.all():  # next to walls, in 3-D, the nearest lie in two layers
+        coefficients[~determined] = _fit(position, values, points[~determined], spacing, NEIGHBOURS_AT_WALLS)[0]
     return coefficients[:, 0], np.swapaxes(coefficients[:, 1 : points.shape[1] + 1], 1, 2) / spacing
+
+
+def _fit(
+    position: FloatArray, values: FloatArray, points: FloatArray, spacing: float, per_dimension: int
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the coefficients (m, c, k) of quadratic fits about points, and whether the particles tell all of them."""
+    distance, index = _nearest(position, points, per_dimension)
+    weight, basis = _basis(distance, position[index] - points[:, None], spacing)
+    weighted = np.swapaxes(weight * basis, 1, 2)
+    size, direction = np.linalg.eigh(weighted @ basis)
+    told = size > SINGULAR * size[:, -1:]
+    turned = np.swapaxes(direction, 1, 2) @ (weighted @ values[index])
+    share = np.where(told, 1.0 / np.where(told, size, 1.0), 0.0)
+    return direction @ (share[..., None] * turned), told.all(axis=1)
 
 
 def _basis(distance: FloatArray, away: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:
@@ -249,8 +279,7 @@ def late_fields(run: Record, points: FloatArray, share: float = 0.25) -> tuple[F
     values, gradients = np.zeros((m, d + 1)), np.zeros((m, d + 1, d))
     late = run.times[run.times >= (1 - share) * run.times[-1:]]
     for snapshot in map(run.snapshot, late):
-        fields = np.column_stack([snapshot.velocity, snapshot.pressure])[snapshot.fluid]
-        found = interpolate(snapshot.position[snapshot.fluid], fields, points, run.spacing)
+        found = interpolate(*_fluid(snapshot, run.spacing), points, run.spacing)
         values, gradients = values + found[0], gradients + found[1]
     count = len(late) or np.nan
     return values / count, gradients / count
@@ -282,8 +311,7 @@ def initial_state(state: dict[str, Any], run: Record, *, outlet: bool = True) ->
     dimensions, own = snapshot.position.shape[1], state["position"].shape[1]
     if dimensions != own:
         raise ConfigError(f"initial_run = '{run.path}': it is in {dimensions}-D and this case in {own}-D")
-    source = snapshot.position[snapshot.fluid]
-    fields = np.column_stack([snapshot.velocity, snapshot.pressure])[snapshot.fluid]
+    source, fields = _fluid(snapshot, run.spacing)
     near = neighbour_tree(source).query(state["position"])[0] < VOID * run.spacing
     takers = {"velocity": [Kind.FLUID, *[Kind.OUTLET] * outlet], "pressure": [Kind.FLUID, Kind.INLET]}
     started = state | {name: state[name].copy() for name in takers}

@@ -178,5 +178,7 @@ def find(name: str | dict[str, Any], *folders: Path) -> type[Case]:
         return model
     if name not in CASES:
         own = "a case of your own is FILE.py:CLASS, an entry point of its package, or put into alsph.cases.CASES before"
+        if (Path(name) / "case.toml").is_file():
+            raise ConfigError(f"'{name}' is a run folder, not a case; its case is {shown(f'{name}/case.toml')}")
         raise ConfigError(f"unknown case '{name}'; {suggest(name, CASES)} ({own})")
     return CASES[name]

@@ -266,8 +266,10 @@ class Driven(Dimensional):
         """The vectors that are given as expressions, by parameter."""
         numbers = {
             name: float(value)
-            for name in type(self).model_fields.keys() - Method.model_fields.keys()
-            if isinstance(value := getattr(self, name), int | float) and not isinstance(value, bool)
+            for name in type(self).model_fields
+            if name not in Method.model_fields
+            and isinstance(value := getattr(self, name), int | float)
+            and not isinstance(value, bool)
         }
         found = {}
         for name in RULES.values():
@@ -302,6 +304,11 @@ class Driven(Dimensional):
     def is_driven(self) -> bool:
         """Whether an expression, not of the class's own, makes the flow another one than its references are of."""
         return bool(self._driven_by)
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether an expression, not of the class's own, moves bodies."""
+        return "body_motion" in self._driven_by
 
     @property
     def _driven_by(self) -> list[str]:

@@ -21,7 +21,7 @@ from alsph.cases.base import Case
 from alsph.cases.series import Series, names
 from alsph.engine.prescribed import asked
 from alsph.engine.simulation import Simulation
-from alsph.errors import ConfigError, RunFolderError
+from alsph.errors import ConfigError, OtherPointsError, RunFolderError
 from alsph.geometry.domain import Domain
 from alsph.geometry.particles import Kind, particles
 from alsph.symbols import GENERAL, WATER, Symbols
@@ -128,10 +128,10 @@ class Gauges(Levels):
         """Return what a run has recorded at places (m, d − 1), :attr:`alsph.Run.gauges`."""
         if not len(places):
             return GaugeRecord(places, np.empty(0), np.empty((0, 0)))
-        path = run.path / cls.file
+        path = run.file(cls.file)
         try:
             cls.of(case, places).check(path)
-        except ValueError as error:
+        except OtherPointsError as error:
             raise RunFolderError(f"{path}: {error} in case.toml, which is of another run or was changed") from None
         time, depth = cls.read(run)
         return GaugeRecord(places, time, depth.T)
@@ -139,7 +139,7 @@ class Gauges(Levels):
     def check(self, path: Path) -> None:
         """Refuse a file of other gauges."""
         if (known := names(path)) and known != self.columns:
-            raise ValueError(f"it holds {', '.join(known[1:])}; the gauges are at other places")
+            raise OtherPointsError(f"holds {', '.join(known[1:])}; the gauges are at other places")
 
     def append(self, path: Path) -> None:
         """Append what has been kept to the file."""

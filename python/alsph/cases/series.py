@@ -98,7 +98,7 @@ class Series(ABC):
     @classmethod
     def read(cls, run: Record) -> tuple[FloatArray, FloatArray]:
         """Return times (k,) and numbers (m, k) of a run; (0,) and (1, 0) where it has none."""
-        path = run.path / cls.file
+        path = run.file(cls.file)
         rows = _lines(path)[1] if path.exists() else []
         if not rows:
             return np.empty(0), np.empty((1, 0))

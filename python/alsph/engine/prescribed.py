@@ -248,8 +248,11 @@ def backflow(domain: Domain, position: FloatArray, velocity: FloatArray, time: f
     Raises
     ------
     ConfigError
-        If they do so on the whole: more fluid would leave through the inlet than enter.
+        If they do so on the whole: more fluid would leave through the inlet than enter; or if one is no finite number.
     """
+    if not (known := np.isfinite(velocity).all(axis=1)).all():
+        place, found = (f"({', '.join(f'{x:.4g}' for x in row[~known][0])})" for row in (position, velocity))
+        raise ConfigError(f"inflow: the velocity at {place} and t* = {time:.4g} is {found}; all must be finite")
     sides = list(domain.inlets())
     if not sides or not len(position):
         return ""

@@ -279,13 +279,19 @@ class Simulation:
         return columns
 
     def sample(self, points: FloatArray) -> dict[str, FloatArray]:
-        """Return the fluid's ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d); NaN far from all fluid.
+        """Return the fluid's ``pressure`` (m,) and ``velocity`` (m, d) at `points` (m, d).
 
-        They are quadratic fits. The pressure is that of :meth:`snapshot`; in other schemes than ``alsph``, where it
-        errs from layer to layer at walls, the fit follows its gradient, too.
+        NaN outside of the domain and where no fluid is within 1.5 Δx, beside a free surface within Δx; points in bodies
+        next to fluid have values. They are quadratic fits. The pressure is that of :meth:`snapshot`; in other schemes
+        than ``alsph``, where it errs from layer to layer at walls, the fit follows its gradient, too.
         """
+        domain = Domain.of(self.problem.settings["domain"])
+        points = domain.wrapped(exact("points", points, np.float64, 2))
         with self._engine() as engine:
-            found = engine.sample(exact("points", points, np.float64, 2))
+            found = engine.sample(points)
+        beyond = ~domain.contains(points, 1e-9)
+        for values in found.values():
+            values[beyond] = np.nan
         surface = self.problem.settings.get("free_surface")
         if surface and not surface["tension"]:  # beyond the last particles the fit knows nothing of the air
             found["pressure"] = np.maximum(found["pressure"], 0.0)

@@ -1,5 +1,6 @@
 """``history.csv``: a row for each step, a number in each column."""
 
+import codecs
 import csv
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,11 +41,11 @@ def names(path: Path) -> list[str]:
         return []
     with path.open("rb") as file:
         header = file.readline()
-    return header.decode(errors="replace").rstrip("\n").split(",") if _names_columns(header) else []
+    return header.decode("utf-8-sig", errors="replace").rstrip().split(",") if _names_columns(header) else []
 
 
 def _names_columns(line: bytes) -> bool:
-    return line.startswith(b"step,") and line.endswith(b"\n")
+    return line.removeprefix(codecs.BOM_UTF8).startswith(b"step,") and line.endswith(b"\n")
 
 
 def append(path: Path, columns: Arrays, order: list[str]) -> None:
@@ -59,8 +60,8 @@ def append(path: Path, columns: Arrays, order: list[str]) -> None:
 def widen(path: Path, columns: list[str]) -> None:
     """Give a file further columns, unknown in all its rows."""
     with path.open("rb") as file, replacing(path) as new_path, new_path.open("wb") as new:
-        new.write(b",".join([next(file).rstrip(b"\n"), *(name.encode() for name in columns)]) + b"\n")
-        new.writelines(row.rstrip(b"\n") + f",{UNKNOWN}".encode() * len(columns) + b"\n" for row in file)
+        new.write(b",".join([next(file).rstrip(b"\r\n"), *(name.encode() for name in columns)]) + b"\n")
+        new.writelines(row.rstrip(b"\r\n") + f",{UNKNOWN}".encode() * len(columns) + b"\n" for row in file)
 
 
 def truncate(path: Path, last: int) -> None:

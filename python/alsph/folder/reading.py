@@ -3,7 +3,7 @@
 import json
 import math
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
@@ -156,7 +156,7 @@ class History:
 
     def _append(self, added: bytes) -> None:
         with _refusing(self.path, UnicodeDecodeError):
-            lines = added.decode("utf-8").splitlines()
+            lines = added.decode("utf-8-sig").splitlines()
         if not self._names:
             self._names = lines.pop(0).split(",")
             if "time" not in self._names:
@@ -300,18 +300,29 @@ def snapshot_times(path: Path) -> FloatArray:
         return np.asarray(times, float)
 
 
+def snapshot_fields(path: Path, step: int, names: Sequence[str]) -> list[FloatArray]:
+    """Read fields of the particles of one snapshot of ``particles.vtkhdf``."""
+    with _opened(path) as file:
+        return _fields(file, step, [f"PointData/{name}" for name in names])
+
+
+def _fields(file: h5py.File, step: int, names: Sequence[str]) -> list[FloatArray]:
+    root = file["VTKHDF"]
+    part = int(sound(root, "Steps/PartOffsets")[step])
+    first = int(sound(root, "Steps/PointOffsets")[step])
+    own = slice(first, first + int(sound(root, "NumberOfPoints")[part]))
+    fields = [np.asarray(rows(sound(root, name), own), float) for name in names]
+    if not all(len(values) == own.stop - own.start > 0 for values in fields):
+        raise ValueError(f"snapshot {step} is incomplete")
+    return fields
+
+
 def snapshot(path: Path, step: int) -> Snapshot:
     """Read one snapshot of ``particles.vtkhdf``."""
     with _opened(path) as file:
-        root = file["VTKHDF"]
-        part = int(sound(root, "Steps/PartOffsets")[step])
-        first = int(sound(root, "Steps/PointOffsets")[step])
-        own = slice(first, first + int(sound(root, "NumberOfPoints")[part]))
-        position = np.asarray(rows(sound(root, "Points"), own), float)
-        fields = {name: np.asarray(rows(sound(root, f"PointData/{name}"), own), float) for name in SNAPSHOT_FIELDS}
-        if not len(position) == own.stop - own.start > 0:
-            raise ValueError(f"snapshot {step} is incomplete")
-        time = float(sound(root, "Steps/Values")[step])
+        position, *values = _fields(file, step, ("Points", *(f"PointData/{name}" for name in SNAPSHOT_FIELDS)))
+        time = float(sound(file["VTKHDF"], "Steps/Values")[step])
+    fields = dict(zip(SNAPSHOT_FIELDS, values, strict=True))
     dimensions = 3 if fields["vorticity"].ndim == 2 else 2
     return Snapshot(
         time=time,

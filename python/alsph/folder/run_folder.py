@@ -25,7 +25,7 @@ import filelock
 from alsph.arrays import Arrays, size_of
 from alsph.engine.output import Output
 from alsph.engine.prescribed import Prescription
-from alsph.errors import DamagedError, RunFolderError
+from alsph.errors import DamagedError, OtherPointsError, RunFolderError
 from alsph.folder import checkpoint, history, reading, vtkhdf
 from alsph.folder.checkpoint import Checkpoint
 from alsph.folder.durable import flush, is_plain, replacing
@@ -398,8 +398,11 @@ def _unless_damaged(path: Path, change: Callable[[Path], None]) -> str:
     except DAMAGE as error:
         if not there or (isinstance(error, OSError) and error.errno is not None):  # the disk's, not the file's
             raise
-        names = (path.with_name(f"{path.stem}.damaged{number or ''}{path.suffix}") for number in itertools.count())
+        why, mark = f"is damaged ({error})", "damaged"
+        if isinstance(error, OtherPointsError):
+            why, mark = str(error), "former"
+        names = (path.with_name(f"{path.stem}.{mark}{number or ''}{path.suffix}") for number in itertools.count())
         aside = next(name for name in names if not name.exists())
         path.replace(aside)
-        return f"{path.name} is damaged ({error}) and set aside as {aside.name}"
+        return f"{path.name} {why} and is set aside as {aside.name}"
     return ""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alsph.arrays import FloatArray
+from alsph.errors import OtherPointsError
 from alsph.folder.durable import growing
 from alsph.folder.reading import sound
 
@@ -36,7 +37,7 @@ def append(path: Path, time: FloatArray, points: Mapping[str, NDArray[Any]], val
 
     Raises
     ------
-    ValueError
+    OtherPointsError
         If the file is of other points.
     """
     name, where = next(iter(points.items()))
@@ -50,7 +51,7 @@ def append(path: Path, time: FloatArray, points: Mapping[str, NDArray[Any]], val
                 file.create_dataset(own, (0, *shape), float, maxshape=(None, *shape), chunks=chunks)
             file.create_dataset("time", (0,), float, maxshape=(None,), chunks=(64,))
         elif file[name].shape != where.shape or not np.allclose(file[name], where, rtol=0, atol=1e-9):
-            raise ValueError("it holds samples at other points")
+            raise OtherPointsError("holds samples at other points")
         count = len(file["time"])
         for own, samples in {**values, "time": time}.items():
             file[own].resize(count + len(samples), axis=0)

@@ -110,6 +110,12 @@ class Domain:
                     found = np.maximum(found, sign * (plane - points[:, axis]))
         return found
 
+    def wrapped(self, points: FloatArray) -> FloatArray:
+        """Return points (m, d) with those beyond periodic sides at the same places within."""
+        lower = np.array(self.lower)
+        beyond = self.periodic & ((points < lower) | (points > np.array(self.upper)))
+        return np.where(beyond, lower + (points - lower) % self.size, points)
+
     def contains(self, points: FloatArray, margin: float = 0.0) -> NDArray[np.bool_]:
         """Return which points (m, d) lie in it, or at most `margin` beyond it [D]; d may be fewer than its own."""
         lower, upper = (np.array(corner[: points.shape[1]]) for corner in (self.lower, self.upper))

@@ -6,13 +6,14 @@ Curves within curves are holes in them, by the even-odd rule, whatever a drawing
 import io
 import json
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from alsph.arrays import FloatArray
 from alsph.errors import ConfigError
@@ -42,6 +43,9 @@ Found = tuple[list[FloatArray], list[str]]
 
 DEFINITIONS = ("marker", "mask", "symbol")
 """Elements of SVG that are drawn only where others refer to them, of those that svgelements draws where they stand."""
+
+UNREAD = ("clip-path", "mask", "transform-origin", "transform")
+"""Attributes and styles of SVG that are not followed, but for the attribute ``transform``."""
 
 
 def is_drawing(path: Path) -> bool:
@@ -89,13 +93,14 @@ def read(path: Path) -> tuple[list[shapely.Polygon], str]:
 def _closed(curves: list[FloatArray], back: Callable[[FloatArray], FloatArray], name: str) -> list[shapely.Polygon]:
     """Return what the curves go around; those that are open are joined where their ends meet, each taken once."""
     ends = [float(np.hypot(*(curve[-1] - curve[0]))) for curve in curves]
-    closed = [
+    drawn = [
         shapely.Polygon(curve) for curve, gap in zip(curves, ends, strict=True) if gap < MEETING and len(curve) > 3
     ]
+    closed = [*dict(zip(shapely.normalize(_coarse(drawn)), drawn, strict=True)).values()]
     rest = [curve for curve, gap in zip(curves, ends, strict=True) if gap >= MEETING]
     if not rest:
         return closed
-    lines = shapely.set_precision([shapely.LineString(curve) for curve in rest], MEETING)
+    lines = _coarse([shapely.LineString(curve) for curve in rest])
     once = dict(zip(shapely.normalize(lines), lines, strict=True))  # whichever way they are drawn
     found, cuts, dangles, crossing = shapely.polygonize_full(list(once.values()))
     ending = "is not closed, it ends at ({}, {}); close it, or take it out"
@@ -108,24 +113,50 @@ def _closed(curves: list[FloatArray], back: Callable[[FloatArray], FloatArray], 
     return [*closed, *(shapely.Polygon(part.exterior) for part in shapely.get_parts(found))]
 
 
+def _coarse(shapes: Sequence[shapely.Geometry]) -> NDArray[np.object_]:
+    """Return shapes to the distance within which curves meet, so that those that are drawn twice are the same."""
+    return np.asarray(shapely.set_precision(shapes, MEETING, mode="pointwise"))
+
+
 def _svg(content: bytes) -> Found:
     import svgelements
 
     tree = ElementTree.fromstring(content)
     curves: list[FloatArray] = []
     other, hidden = Counter[str](), _undrawn(tree)
-    drawing = svgelements.SVG.parse(io.BytesIO(ElementTree.tostring(tree)), reify=True, parse_display_none=True)
+    # Not reified: an arc that is skewed would be wrong, and one of a circle refused.
+    drawing = svgelements.SVG.parse(io.BytesIO(ElementTree.tostring(tree)), reify=False, parse_display_none=True)
     for element in _displayed(drawing, hidden):
         kind = type(element).__name__.lower()
         if not isinstance(element, svgelements.Shape):
             other[kind] += isinstance(element, svgelements.Text | svgelements.Image | svgelements.Use)
-        elif element.values.get("visibility") in ("hidden", "collapse"):
+        elif _is_invisible(element):
             hidden[kind] += 1
         else:
-            path = svgelements.Path(element)
-            path.reify()
-            curves += [_sampled(svgelements.Path(part)) for part in path.as_subpaths()]
-    return [curve * [1.0, -1.0] for curve in curves if len(curve)], _left_out(other, hidden)
+            path, to = svgelements.Path(element), element.transform
+            turn = np.array([[to.a, to.b], [to.c, to.d]], float)
+            curves += [_sampled(svgelements.Path(part)) @ turn + [to.e, to.f] for part in path.as_subpaths()]
+    said = _left_out(other, hidden)
+    if unread := [name for name in UNREAD if name in {*_properties(tree)}]:
+        said.append(f"not regarded: {', '.join(unread)}, which may cut or move what is drawn; apply it in the drawing")
+    return [curve * [1.0, -1.0] for curve in curves if len(curve)], said
+
+
+def _properties(tree: ElementTree.Element) -> Iterable[str]:
+    """Yield the attributes of all elements but ``transform``, and the properties that they have by CSS."""
+    for element in tree.iter():
+        yield from (name for name in element.keys() if name != "transform")
+        style = element.get("style", "")
+        if element.tag.rpartition("}")[2] == "style":
+            style = (element.text or "").replace("{", ";")
+        yield from (part.partition(":")[0].strip() for part in style.split(";"))
+
+
+def _is_invisible(element: Any) -> bool:
+    """Whether an element of svgelements says that nothing is seen of it."""
+    values = element.values
+    unfilled = str(values.get("fill")) == "none" and str(values.get("stroke", "none")) == "none"
+    return unfilled or values.get("visibility") in ("hidden", "collapse") or str(values.get("opacity")) in ("0", "0%")
 
 
 def _displayed(element: Any, hidden: Counter[str]) -> Iterable[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from functools import cached_property
 from io import StringIO
@@ -22,6 +23,8 @@ LARGEST_FILE = 2**28
 """Size of the largest file that is read [bytes]."""
 MOST_TRIANGLES = 50_000
 """A run folder holds them as text, some 40 bytes a triangle."""
+FAR = 100.0
+"""How many extents from the origin a mesh is brought there for its integrals, which lose their digits otherwise."""
 UNREADABLE = "holds no triangles that can be read; is it whole, and of the format that its name says?"
 
 
@@ -98,7 +101,9 @@ class Mesh(Shape):
             )
         mesh.fix_normals()
         remark = _of_one_body(mesh, name)
-        lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in mesh.vertices]
+        far = float(np.abs(mesh.vertices).max() / np.ptp(mesh.vertices, axis=0).max())
+        digits = min(9 + math.ceil(math.log10(max(far, 1.0))), 17)  # nine of the body, wherever it lies
+        lines = [" ".join(["v", *(f"{x:.{digits}g}" for x in vertex)]) for vertex in mesh.vertices]
         lines += [f"f {i} {j} {k}" for i, j, k in mesh.faces + 1]
         text = "\n".join([*lines, ""])
         return cls(file=name, sha256=sha256(text), triangles=text, remark=remark)
@@ -129,7 +134,9 @@ class Mesh(Shape):
             Angle of attack [degrees].
         """
         mesh = self.surface
-        extent = float(np.ptp(mesh.vertices, axis=0).max())
+        extent, middle = float(np.ptp(mesh.vertices, axis=0).max()), mesh.bounds.mean(axis=0)
+        if np.abs(middle).max() > FAR * extent:
+            mesh = mesh.copy().apply_translation(-middle)
         vertices = (np.asarray(mesh.vertices) - mesh.center_mass) * (scale / extent) @ nose_up(angle).T
         triangles = np.asarray(mesh.faces, np.int64)
 
@@ -169,10 +176,16 @@ def _of_one_body(mesh: Any, name: str) -> str:
 
     shells = _library().graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
     firsts = np.unique(shells, return_index=True)[1]
-    if len(firsts) == 1:
-        return ""
     vertices, triangles = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
     pairs = find_self_intersections(vertices, triangles)[1]
+    own = pairs[shells[pairs[:, 0]] == shells[pairs[:, 1]]]
+    crossing = ""
+    if len(own):
+        x, y, z = mesh.triangles_center[own[0, 0]]
+        where = f"{len(own)} pairs of its triangles cross, as near ({x:.4g}, {y:.4g}, {z:.4g})"
+        crossing = f"{where}: what lies beyond them may be taken for fluid; mend it in the program that made it"
+    if len(firsts) == 1:
+        return crossing
     overlapping = pairs[shells[pairs[:, 0]] != shells[pairs[:, 1]]]
     if len(overlapping):
         one, two = sorted(shells[overlapping[0]] + 1)
@@ -190,7 +203,8 @@ def _of_one_body(mesh: Any, name: str) -> str:
         f"{filled} of its {len(firsts)} shells, within others, left out: the body is solid there, without a cavity",
         f"its {apart} shells, apart from each other, are one body: drag and lift are those of all of them together",
     ]
-    return "; ".join(remark for remark, holds in zip(remarks, (filled, apart > 1), strict=True) if holds)
+    told = [remark for remark, holds in zip(remarks, (filled, apart > 1), strict=True) if holds]
+    return "; ".join([*told, *filter(None, [crossing])])
 
 
 def _nearest(vertices: FloatArray, triangles: NDArray[np.int64], points: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -57,7 +57,7 @@ class Outline(Shape):
             try:
                 found = cls.of(bodies)
             except ConfigError as error:
-                raise ConfigError(f"{name}: {error}") from None
+                raise ConfigError(f"{name}: {error}, as seen from its lower left corner; {remark}") from None
             remarks = "; ".join(filter(None, (remark, found.remark)))
             return cls(file=name, sha256=found.sha256, points=found.points, remark=remarks)
         return cls._around(curves(decoded(path), name), name)
@@ -183,7 +183,12 @@ def _closed(curve: list[Line], name: str) -> tuple[shapely.Polygon, str]:
     if body.interiors or lost > SLIVER or shorter > SHORTENED:
         nearest = np.argsort(shapely.distance(edges, shapely.Point(x, y)), kind="stable")[:2]
         one, two = sorted((points[index] for index in nearest), key=lambda point: point.number)
+        again = [point.number for point in points[1:] if point.values == points[0].values]
         remedy = "; a hole is a curve of its own: put a blank line before it" if body.interiors else ""
+        if again and not remedy:
+            remedy = (
+                f"; its first point comes again in line {again[0]}: if a side begins there, put a blank line before it"
+            )
         fault = f"the curve meets itself after this line and after line {two.number}, at ({x:.6g}, {y:.6g}){remedy}"
         raise refusal(name, one, fault)
     if max(lost, shorter) < 1e-6:

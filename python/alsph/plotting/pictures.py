@@ -38,8 +38,6 @@ TALLEST = 1.5  # height over width, beyond which the picture is made narrower th
 
 INSIDE = 0.75  # share of the space around that fluid fills, above which it is neither at a free surface nor spray
 
-DROP = 0.54  # times √d: radius of a particle in the air, how far fluid reaches beyond its outermost particles [Δx]
-
 AIR = "0.88"  # colour beside a free surface: spray without pressure is white
 
 ROOM = 0.1  # of a picture's longer side, that is left beside a free surface
@@ -300,11 +298,8 @@ def _raster(
     picture = sampling.average(fluid, values, points, spacing)
     if whole.domain is None or not meets_air(whole):
         return picture.reshape(shape), np.isfinite(picture).reshape(shape)
-    # Solids, too, fill what is beside a surface.
-    around, _ = sampling.with_images(whole.position, whole.pressure, whole.domain, sampling.REACH * spacing)
-    filled, radius = sampling.fill(around, points, spacing), DROP * np.sqrt(points.shape[1]) * spacing
-    free = filled < 0.5 * sampling.room(points, whole.domain, spacing)
-    picture[free & (sampling.distance(around, points) > radius)] = np.nan
+    air, filled = sampling.in_air(whole, points, spacing)
+    picture[air] = np.nan
     scaled, full = np.isfinite(picture), filled > INSIDE
     scaled = scaled & full if (scaled & full).any() else scaled
     return picture.reshape(shape), scaled.reshape(shape)

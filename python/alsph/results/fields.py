@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     import xarray
 
 FARTHEST = 0.5
-"""How far from a snapshot a time may lie that is asked for [D/U], if snapshots are not farther apart."""
+"""How far from the only snapshot a time may lie that is asked for [D/U]."""
 
 
 class Fields:
@@ -41,6 +41,25 @@ class Fields:
 
     path: Path
     case: dict[str, Any]
+
+    info: dict[str, Any]
+    _folder: Path
+
+    def file(self, name: str) -> Path:
+        """Return a file or folder in the run folder, wherever the working directory has gone since it was opened.
+
+        Raises
+        ------
+        RunFolderError
+            If another run has been made in the folder since.
+        """
+        both = self.info, reading.info(self._folder / "run.json")
+        began = ((info.get("start"), info.get("segments", [])[:1]) for info in both)  # the particles, and the case
+        if any(one and other and one != other for one, other in zip(*began, strict=True)):
+            raise RunFolderError(
+                f"{self.path}: another run has been made there since this one was opened; open it anew"
+            )
+        return self._folder / name
 
     @property
     @abstractmethod
@@ -55,7 +74,7 @@ class Fields:
     @cached_property
     def config(self) -> Config:
         """The case and the settings of the run, as the objects that :attr:`case` was written from."""
-        return of_run(self.path)
+        return of_run(self.file("case.toml").parent)
 
     @cached_property
     def symbols(self) -> Symbols:
@@ -68,7 +87,7 @@ class Fields:
     @cached_property
     def times(self) -> FloatArray:
         """Times tU/D of the snapshots, shape (k,)."""
-        return reading.snapshot_times(self.path / "particles.vtkhdf")
+        return reading.snapshot_times(self.file("particles.vtkhdf"))
 
     def snapshot(self, time: float | None = None) -> Snapshot:
         """Particles of the snapshot nearest to a time tU/D, the last one if None.
@@ -85,10 +104,11 @@ class Fields:
         if len(self.times) == 0:
             raise RunFolderError(f"{self.path}: no snapshot yet; wait for the first one or lower output_interval")
         index = len(self.times) - 1 if time is None else int(np.abs(self.times - time).argmin())
-        if time is not None and abs(self.times[index] - time) > np.diff(self.times).max(initial=FARTHEST):
+        apart = np.diff(self.times).max() if len(self.times) > 1 else FARTHEST
+        if time is not None and abs(self.times[index] - time) > apart:
             first, last = self.times[[0, -1]]
             raise ConfigError(f"time = {time:g}: no snapshot near it, they are of t* = {first:.6g} to {last:.6g}")
-        found = reading.snapshot(self.path / "particles.vtkhdf", index)
+        found = reading.snapshot(self.file("particles.vtkhdf"), index)
         with suppress(RunFolderError):  # of a case that is not known the particles can be read all the same
             return replace(found, domain=self.config.case.checked_domain, solid=self._solid_height(found.time))
         return found
@@ -124,7 +144,7 @@ class Fields:
     @cached_property
     def probes(self) -> Probes:
         """Velocity and pressure at the probes over time; empty without any."""
-        return reading.probes(self.path / "probes.h5", self.config.case.space_dimensions)
+        return reading.probes(self.file("probes.h5"), self.config.case.space_dimensions)
 
     @cached_property
     def planes(self) -> list[PlaneRecord]:
@@ -136,7 +156,7 @@ class Fields:
             If the file is damaged, or of other planes than the configuration's.
         """
         grids = self.config.planes
-        found = reading.probes(self.path / "planes.h5", self.config.case.space_dimensions)
+        found = reading.probes(self.file("planes.h5"), self.config.case.space_dimensions)
         return export.plane_records(found, grids, self.symbols)
 
     def sample(self, points: ArrayLike, time: float | None = None) -> dict[str, FloatArray]:
@@ -154,7 +174,7 @@ class Fields:
         dict of ndarray
             ``velocity`` (m, d), ``pressure`` (m,), ``velocity_gradient`` (m, d, d), the derivative of component k
             along direction l at [:, k, l], and ``pressure_gradient`` (m, d), by quadratic moving least squares; NaN
-            outside of the domain and where no fluid is within 1.5 Δx.
+            outside of the domain, beyond a free surface and where no fluid is within 1.5 Δx.
 
         Raises
         ------
@@ -170,7 +190,7 @@ class Fields:
     @cached_property
     def history(self) -> dict[str, FloatArray]:
         """Columns of ``history.csv``, one entry a step; only an empty ``time`` before the first step."""
-        return reading.history(self.path / "history.csv")
+        return reading.history(self.file("history.csv"))
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the history as a table of pandas, one row a step, by time tU/D.

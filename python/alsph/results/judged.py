@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -11,10 +12,10 @@ from alsph.analysis.measures import Measure, Profile, alone
 from alsph.analysis.record import Record
 from alsph.cases import answers
 from alsph.cases.method import Method
-from alsph.config import Config
+from alsph.config import Config, of_the_flow
 from alsph.errors import AlsphError, ConfigError
 from alsph.geometry.particles import Snapshot
-from alsph.results.outcome import changes
+from alsph.results.outcome import changes, told_changes
 from alsph.run_settings import RunSettings
 from alsph.text import shown
 
@@ -26,7 +27,8 @@ OWN_NAMES = frozenset(
         *("Reynolds number", "resolution, D/Δx", "computing time", "time reached, tU/D", "iterations of a step"),
         *("averaged from tU/D", "averaged to tU/D", "averaging rule", "shedding periods"),
         *("share of the body that is computed", "artificial Mach number", "artificial Mach number of the penalty"),
-        *("mean velocity divergence, |∇·u| D/U", "largest velocity divergence, |∇·u| D/U"),
+        *("mean velocity divergence, |∇·u| D/U", "mean velocity divergence at the end of a step, |∇·u| D/U"),
+        "mean of the largest velocity divergence, |∇·u| D/U",
         *("sum of the velocity divergence, Σ|∇·u| D/U", "mean time step, ΔtU/Δx", "mean iterations"),
     )
 )
@@ -37,6 +39,10 @@ NUMBERED = re.compile(r"remark \d+")
 
 ELSEWHERE = "no reference: it is of the flow from the case's own start on, and this run goes on with another's"
 """The remark on a run that an initial run takes its reference."""
+
+
+DRIVEN = "driven: bodies are moved, and drag and lift follow; periods and a Strouhal number may be the motion's"
+"""The remark on a run that finds periods where bodies are moved by a user's expression."""
 
 
 class _Until:
@@ -113,9 +119,39 @@ def _check_names(measures: Iterable[Measure], config: Config) -> None:
             raise ConfigError(f"{type(case).__name__}.measures(): {shown(name)}: {told}; give it another one")
 
 
+def edited(run: Record, config: Config) -> dict[str, tuple[Any, Any]]:
+    """Return what each parameter was that the run was made with, and what its file says now, where that is another."""
+    segments = run.info.get("segments", [])
+    made = [
+        of_the_flow(tables) for tables in (*(part["case"] for part in segments[-1:]), run.info.get("began")) if tables
+    ]
+    if not made:
+        return {}
+    case = type(config.case)
+    defaults = {name: field.default for name, field in case.model_fields.items()}
+    says = defaults | json.loads(json.dumps(config.flow_tables()))
+    found = {}
+    for name, value in says.items():
+        was = [tables.get(name, defaults.get(name)) for tables in made]
+        if value not in was:
+            found[name] = (was[0], value)
+    return found
+
+
+def noted(run: Record, config: Config) -> list[str]:
+    """Remark on what a run is judged by: of which flow its references are, its file's parameters and its periods."""
+    found = [ELSEWHERE] if goes_on_elsewhere(run, config) else []
+    if changed := edited(run, config):
+        told = f"case.toml was changed after the run was made: {told_changes(changed)}"
+        found.append(f"edited: {told}; put it back, or resume the run with it: numbers made with both are of no flow")
+    if config.case.is_moved and run.window.periods:
+        found.append(DRIVEN)
+    return found
+
+
 def stands_alone(run: Record, config: Config) -> bool:
     """Whether what is known of the case's flow does not hold for a run of it."""
-    names = {name for _, changed in changes(run) for name in changed}
+    names = {name for _, changed in changes(run) for name in changed} | edited(run, config).keys()
     return config.case.is_driven or goes_on_elsewhere(run, config) or bool(names - Method.model_fields.keys())
 
 

@@ -37,7 +37,8 @@ class Ledger:
     volume_error : ndarray, shape (n,)
         Σ V_i over the volume of the space that the fluid fills (`Case.fluid_volume`), less 1.
     kinetic_energy : ndarray, shape (n,)
-        E = Σ ½ m_i |u_i|² of the fluid particles [ρU²D^d].
+        E = ½ρ ∫ |u|² dV [ρU²D^d], as Σ V_i of the fluid particles in a step before their shift, beside a free surface
+        Σ m_i; of fields with jumps, as at a lid in the first steps, that differs from a sum over a snapshot.
     energy_rate : ndarray, shape (n,)
         dE/dt, by central differences [ρU³D^(d-1)].
     snapshot_time : ndarray, shape (k,)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import cached_property
 
 import numpy as np
@@ -11,12 +12,16 @@ from alsph.analysis import averages
 from alsph.analysis.averages import Estimate, Window
 from alsph.analysis.loads import Divergence, Load, PressureCoefficient
 from alsph.arrays import AXES, FloatArray
-from alsph.errors import ConfigError
+from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
+from alsph.geometry.particles import Kind
 from alsph.geometry.points import checked_point
 from alsph.parameters import choose
 from alsph.results.fields import Fields
 from alsph.text import shown
+
+MOST_SNAPSHOTS = 12
+"""Of which the divergence at the end of a step is taken."""
 
 
 class Loads(Fields):
@@ -122,8 +127,9 @@ class Loads(Fields):
         body : str, optional
             Name of the body; all of those that drag and lift are of, if None.
         about : (x, y), optional
-            Point that the moment is about [D]; if None, that of the case: a quarter of the chord behind the leading
-            edge of a ``body``, the centre of a cylinder.
+            Point that the moment is about, which stays where it is [D]; if None, that of the case: a quarter of the
+            chord behind the leading edge of a ``body``, the centre of a cylinder. That goes along with a body that
+            moves, unless it is that of several.
 
         Returns
         -------
@@ -145,8 +151,13 @@ class Loads(Fields):
             for each in parts:
                 moment += self.history.get(f"{name}_{each}_torque", missing)
             x, y = np.subtract(centres.get(name, np.nan), point)
-            turned = self.history.get(f"{name}_angle", 0.0)  # the point goes along with a body that moves
-            x, y = x * np.cos(turned) - y * np.sin(turned), x * np.sin(turned) + y * np.cos(turned)
+            if about is None and len(names) == 1:
+                turned = self.history.get(f"{name}_angle", 0.0)
+                x, y = x * np.cos(turned) - y * np.sin(turned), x * np.sin(turned) + y * np.cos(turned)
+            else:
+                x, y = (
+                    way + self.history.get(f"{name}_displacement_{axis}", 0.0) for way, axis in ((x, "x"), (y, "y"))
+                )
             moment += x * self._force("y", part, name) - y * self._force("x", part, name)
         return -2.0 * moment / case.chord**2
 
@@ -171,15 +182,28 @@ class Loads(Fields):
     def divergence(self) -> Divergence:
         """Velocity divergence over the averaging window."""
         columns = (self.history.get(f"divergence_{name}", np.empty(0)) for name in ("mean", "sum", "max"))
-        return Divergence(*(self._measure(averages.mean, column) for column in columns))
+        mean, total, largest = (self._measure(averages.mean, column) for column in columns)
+        return Divergence(mean, total, largest, self._divergence_at_end())
+
+    def _divergence_at_end(self) -> Estimate:
+        """Return the mean |∇·u| of the fluid in snapshots of the window, in some of them where they are many."""
+        path, found = self.file("particles.vtkhdf"), []
+        with suppress(RunFolderError):  # without particles forces can be judged all the same
+            inside = np.flatnonzero((self.times >= self.window.start) & (self.times <= self.window.end))
+            for step in inside[:: 1 + len(inside) // MOST_SNAPSHOTS]:
+                divergence, kind = reading.snapshot_fields(path, step, ("velocity_divergence", "kind"))
+                found.append(np.abs(divergence[kind == Kind.FLUID]).mean())
+        if not found:
+            return Estimate(np.nan, note="no snapshot between these times")
+        return Estimate(np.mean(found), note=f"of {len(found)} snapshots")
 
     @cached_property
     def pressure_coefficient(self) -> PressureCoefficient:
         """Mean pressure coefficient (22) on the surface."""
-        angle, time, samples = reading.surface(self.path / "surface.h5")
+        angle, time, samples = reading.surface(self.file("surface.h5"))
         mean, deviation = averages.mean_profile(time, samples, self.window)
         inside = np.count_nonzero((time >= self.window.start) & (time <= self.window.end))
-        surface = reading.surface_points(self.path / "surface.h5")
+        surface = reading.surface_points(self.file("surface.h5"))
         if surface is None:  # of an older version, be it at the same points
             case = self.config.case.surface_points()
             surface = case if case and np.array_equal(case.angle, angle) else None

@@ -27,6 +27,9 @@ BACKFLOW = 0.01
 """Share of an outlet's buffer that comes back, in the mean over the window, from which on it is remarked upon."""
 
 
+PACKING = 0.1
+"""Mean of `packing_rms` from which on it is remarked upon; shipped cases have up to 0.02."""
+
 UNSOLVED = 0.05
 """Mean residual of the Poisson equation from which on it is remarked upon that nothing asked for less: BiCGSTAB and
 multigrid leave up to 1e-3, Jacobi's iteration that ends by its change 0.007 in a periodic box and 1 past a body."""
@@ -44,19 +47,25 @@ def outcome(run: Record, until: str, scheme: str | None = None) -> list[str]:
         found.append(f"{run.status}: at tU/D = {reached:.4g} of {until}; results are those up to there")
     if retries := run.info.get("retries"):
         found.append(f"retried: broke down {len(retries)} times, went on with smaller time steps")
-    found += missing(run.history)
-    if told := [f"at tU/D = {time:.4g} {_told(what)}" for time, what in changes(run)]:
+    found += missing(run)
+    if told := [f"at tU/D = {time:.4g} {told_changes(what)}" for time, what in changes(run)]:
         found.append(f"changed on the way: {'; '.join(told)}; averages may go across it")
-    if run.divergence.mean > DIVERGENCE:
+    divergence, at_surface = run.divergence, has_surface(run.history)
+    largest = divergence.mean if at_surface else np.fmax(divergence.mean, divergence.at_end)
+    if largest > DIVERGENCE:
         remedy = "more projection_sweeps lower it"
         if scheme in DIFFUSION:
             remedy = "a larger sound_speed lowers it"
-        elif scheme in (None, "alsph") and not has_surface(run.history):
+        elif scheme in (None, "alsph") and not at_surface:
             remedy = "more projection_sweeps or max_iterations lower it"
-        if has_surface(run.history):
+        if at_surface:
             remedy = f"particles at the surface and alone in the air count, too; {remedy}"
-        found.append(f"not divergence-free: mean |∇·u| = {float(run.divergence.mean):.2g} U/D; {remedy}")
-    found += [*lost(run), *thinned(run.history), *backflow(run)]
+        where = ""
+        if largest > 2 * divergence.mean:
+            where = f" where steps end, {float(divergence.mean):.2g} where they take their derivatives"
+            remedy = "derivatives in the middle of a step, as those of alsph and isph, leave less"
+        found.append(f"not divergence-free: mean |∇·u| = {float(largest):.2g} U/D{where}; {remedy}")
+    found += [*lost(run), *crowded(run.history), *thinned(run.history), *backflow(run)]
     if run.body and run.window.edges.size:
         found += unsettled(run.window)
         if run.drag.mean < -NO_DRAG and not (has_moved(run.history) or has_surface(run.history)):
@@ -64,16 +73,20 @@ def outcome(run: Record, until: str, scheme: str | None = None) -> list[str]:
     return found
 
 
-def missing(history: Mapping[str, FloatArray]) -> list[str]:
+def missing(run: Record) -> list[str]:
     """Remark on steps of which nothing is recorded, in a file that was damaged."""
-    steps = history.get("step", np.empty(0))
-    if not len(steps) or not (lost := int(steps[-1]) - len(steps)):
+    steps = run.history.get("step", np.empty(0))
+    if not len(steps):
         return []
-    first = int(np.argmax(np.diff(steps, prepend=0) > 1))
+    made = int(steps[-1])
+    if run.status not in ("starting", "running"):
+        made = max(made, int(run.info.get("step", 0)))
+    if not (lost := made - len(steps)):
+        return []
+    gap = np.diff(steps, prepend=0, append=made + 1) > 1
+    first = int(np.argmax(gap))
     after = f"the first behind step {int(steps[first - 1])}" if first else "the first ones"
-    return [
-        f"incomplete: {lost} of {int(steps[-1])} steps are missing in the history, {after}; averages are without them"
-    ]
+    return [f"incomplete: {lost} of {made} steps are missing in the history, {after}; averages are without them"]
 
 
 def changes(run: Record) -> list[tuple[float, dict[str, tuple[Any, Any]]]]:
@@ -91,7 +104,7 @@ def changes(run: Record) -> list[tuple[float, dict[str, tuple[Any, Any]]]]:
     return found
 
 
-def _told(changed: Mapping[str, tuple[Any, Any]]) -> str:
+def told_changes(changed: Mapping[str, tuple[Any, Any]]) -> str:
     """Return changes in words; of what a table such as an outline holds too much is to be told."""
     return ", ".join(f"{name} {_brief(was)} -> {_brief(became)}" for name, (was, became) in changed.items())
 
@@ -138,6 +151,16 @@ def lost(run: Record) -> list[str]:
         return []
     share = f"{100 * (1 - fluid[-1] / fluid.max()):.2g} %"
     return [f"lost: {share} of the fluid has left through the sides open to the air; a larger domain keeps it"]
+
+
+def crowded(history: Mapping[str, FloatArray]) -> list[str]:
+    """Remark on fluid whose particles are not Δx apart, for which kernel, walls and masses are made."""
+    columns = (history.get(f"packing_{name}", np.empty(0)) for name in ("rms", "min", "max"))
+    rms, least, most = (float(np.mean(column[np.isfinite(column)] if column.size else np.nan)) for column in columns)
+    if not rms > PACKING:
+        return []
+    text = f"{least:.3g} to {most:.3g} times as dense as particles Δx apart, {100 * rms:.2g} % off in the mean"
+    return [f"packing: the fluid is {text}; is it placed with another spacing than 1/resolution?"]
 
 
 def thinned(history: Mapping[str, FloatArray]) -> list[str]:

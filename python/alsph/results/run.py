@@ -30,7 +30,7 @@ from alsph.geometry.plane import Plane
 from alsph.parameters import choose
 from alsph.results.dimensional import dimensional
 from alsph.results.export import Grid
-from alsph.results.judged import ELSEWHERE, drawn, goes_on_elsewhere, judged
+from alsph.results.judged import drawn, judged, noted
 from alsph.results.ledger import Ledger, mach_number
 from alsph.results.loads import Loads
 from alsph.results.outcome import ended_early, made, outcome, unsolved
@@ -69,15 +69,13 @@ class Run(Loads):
         if not self.path.is_dir():
             there = "a file, and no run folder" if self.path.exists() else "no such run folder"
             raise RunFolderError(f"{self.path}: {there}")
+        self._folder = self.path.absolute()
         self.case: dict[str, Any] = reading.case(self.path / "case.toml")
         self.info: dict[str, Any] = reading.info(self.path / "run.json")
-        if self._goes_on() and RunFolder(self.path).is_busy() is False:
+        if self.status in ("starting", "running") and RunFolder(self.path).is_busy() is False:
             self.info = reading.info(self.path / "run.json")  # it may just have ended
-            if self._goes_on():
+            if self.status in ("starting", "running"):
                 self.info |= {"status": "stopped", "message": self._how_to_go_on()}
-
-    def _goes_on(self) -> bool:
-        return self.info.get("status") in ("starting", "running")
 
     def _how_to_go_on(self) -> str:
         """Return what to say of a run that has neither ended nor a process at work in it."""
@@ -143,7 +141,7 @@ class Run(Loads):
             *made(self.measures),
             *self._judged[1],
             *(self._drawn[1] if is_own(case) else []),
-            *([ELSEWHERE] if goes_on_elsewhere(self, self.config) else []),
+            *noted(self, self.config),
             *self.config.remarks,
         ]
         return [self.symbols(remark) for remark in found]
@@ -208,7 +206,9 @@ class Run(Loads):
         if (share := self.config.case.computed_share) < 1:
             results["share of the body that is computed"] = share
         results["mean velocity divergence, |∇·u| D/U"] = self.divergence.mean
-        results["largest velocity divergence, |∇·u| D/U"] = self.divergence.max
+        if not np.isnan(self.divergence.at_end):
+            results["mean velocity divergence at the end of a step, |∇·u| D/U"] = self.divergence.at_end
+        results["mean of the largest velocity divergence, |∇·u| D/U"] = self.divergence.max
         if np.isfinite(self.config.case.expected_penalty_constant()):
             waves = "" if self.config.case.is_weakly_compressible else " of the penalty"
             results[f"artificial Mach number{waves}"] = Estimate(mach_number(self.history))
@@ -341,8 +341,8 @@ class Run(Loads):
         """
         plane_of = self.plane(self.snapshot(self.times[0]), plane) if len(self.times) else None
         if path is None:
-            check_folder(self.path / "figures")
-        target: Path = _plotting().Film(path if path is not None else self.path / "figures" / f"{name}.gif")
+            check_folder(self.file("figures"))
+        target: Path = _plotting().Film(path if path is not None else self.file("figures") / f"{name}.gif")
         _plotting().animate(
             self,
             name,

@@ -51,9 +51,9 @@ class Convergence:
         ``monotonic``, ``oscillating`` or ``diverging``: how the last three follow each other; ``within ±`` if the last
         two differ by no more than their uncertainties, ``unknown`` if one of these is infinite or a value is NaN.
     order : float
-        Observed order p; NaN unless monotonic.
+        Observed order p; NaN unless monotonic. Of an error, whose reference is zero, that between the last two.
     richardson : float
-        Value extrapolated to Δx = 0; NaN unless monotonic, and of an error that would fall below zero.
+        Value extrapolated to Δx = 0; NaN unless monotonic, and of errors, whose limit is known.
     index : float
         Grid convergence index of the finest resolution, 1.25 |e| / (r^p − 1) with the relative change e of the last
         refinement by r; half the range over the finest value where the values oscillate; NaN where they diverge, and of
@@ -92,6 +92,7 @@ def grid_convergence(
     -----
     The order p solves (φ₁ − φ₂)/(φ₂ − φ₃) = (r₁₂^p − 1) r₂₃^p / (r₂₃^p − 1) of f = φ + C Δx^p through the last three
     values, from coarse (1) to fine (3): the procedure of Celik et al. (J. Fluids Eng. 130, 078001, 2008), section 2.
+    An error is known to go to zero, so that two of them tell an order: log (φ₂/φ₃) / log r₂₃.
     """
     known = tuple(map(float, resolutions)), tuple(values)
     if len(resolutions) < 3 or len(values) != len(resolutions):
@@ -100,7 +101,7 @@ def grid_convergence(
     if not n1 < n2 < n3:
         raise ConfigError(f"{name}: resolutions must increase, and are {n1:g}, {n2:g}, {n3:g}")
     coarse, fine = f2 - f1, f3 - f2
-    scale = np.nan if reference == 0 or f3 == 0 else abs(f3)
+    scale = abs(f3) if f3 else np.nan
     unknown = np.nan, np.nan
     if not np.isfinite([coarse, fine]).all():
         return Convergence(name, *known, "unknown", *unknown, np.nan, reference)
@@ -110,6 +111,12 @@ def grid_convergence(
     if fine == 0:
         return Convergence(name, *known, "monotonic", *unknown, np.nan, reference)
     ratio, r12, r23 = coarse / fine, n2 / n1, n3 / n2
+    if reference == 0:
+        e1, e2, e3 = map(abs, (f1, f2, f3))
+        shrinks, grows = e1 > e2 > e3 and f1 * f2 > 0 < f2 * f3, e1 < e2 < e3
+        order = math.log(e2 / e3) / math.log(r23) if shrinks else np.nan
+        kind = "monotonic" if shrinks else "diverging" if grows else "oscillating"
+        return Convergence(name, *known, kind, order, np.nan, np.nan, reference)
     if ratio < 0:
         spread = np.ptp([f1, f2, f3]) / 2 / scale
         return Convergence(name, *known, "oscillating", *unknown, float(spread), reference)
@@ -124,8 +131,6 @@ def grid_convergence(
 
     order = float(brentq(mismatch, 1e-3, LARGEST_ORDER))
     richardson = f3 + fine / (r23**order - 1)
-    if reference == 0 and richardson / f3 < -0.1:  # no error is below zero: the values are not yet on their way to it
-        return Convergence(name, *known, "monotonic", *unknown, np.nan, reference)
     index = SAFETY * abs(fine) / scale / (r23**order - 1)
     return Convergence(name, *known, "monotonic", order, float(richardson), float(index), reference)
 
@@ -299,7 +304,7 @@ def _no_order(found: Convergence) -> str:
         return ""
     if found.values[-2] == found.values[-1]:
         return "the last two are the same"
-    return f"faster than Δx^{LARGEST_ORDER:g}" if found.reference else "too coarse to extrapolate"
+    return f"faster than Δx^{LARGEST_ORDER:g}"
 
 
 def _uncertainty(value: float) -> float:

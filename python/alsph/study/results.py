@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 DIVERGENCE = "mean velocity divergence, |∇·u| D/U"
 OF_ALL_RUNS = (
     DIVERGENCE,
+    "mean velocity divergence at the end of a step, |∇·u| D/U",
     "sum of the velocity divergence, Σ|∇·u| D/U",
     "shedding periods",
     "steps",
@@ -382,6 +383,7 @@ def _collected(folder: Path, state: State) -> tuple[dict[str, Any], dict[str, fl
         history = run.history
         numbers = (
             run.divergence.mean,
+            run.divergence.at_end,
             run.divergence.sum,
             run.window.periods,
             len(history["time"]),
