@@ -406,6 +406,14 @@ def test_a_history_whose_times_do_not_increase_is_refused_and_set_aside(tmp_path
         resume(path, until=0.2, progress=False)
 
 
+def test_snapshots_that_are_gone_are_told(tmp_path, small):
+    path = small.run(tmp_path / "run", until=0.05, progress=False).path
+    assert not any(remark.startswith("incomplete") for remark in alsph.open_run(path).remarks)
+    (path / "particles.vtkhdf").unlink()
+    run = alsph.open_run(resume(path, until=0.1, progress=False).path)
+    assert f"incomplete: the snapshots before tU/D = {run.times[0]:.4g} are missing in particles.vtkhdf" in run.remarks
+
+
 def test_a_history_that_a_spreadsheet_has_saved_goes_on(tmp_path, small):
     path = small.replace(time_step=0.05).run(tmp_path / "run", until=0.1, progress=False).path
     content = (path / "history.csv").read_bytes()

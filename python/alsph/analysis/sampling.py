@@ -183,7 +183,7 @@ def _fit(
     told = size > SINGULAR * size[:, -1:]
     turned = np.swapaxes(direction, 1, 2) @ (weighted @ values[index])
     share = np.where(told, 1.0 / np.where(told, size, 1.0), 0.0)
-    return direction @ (share[..., None] * turned), told.all(axis=1)
+    return direction @ (share[..., None] * turned), np.asarray(told.all(axis=1))
 
 
 def _basis(distance: FloatArray, away: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:

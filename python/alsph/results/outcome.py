@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from alsph.arrays import FloatArray
 from alsph.cases.free_surface import ENERGY
 from alsph.cases.method import DIFFUSION
 from alsph.config import of_the_flow
+from alsph.errors import RunFolderError
 from alsph.text import shown
 
 DIVERGENCE = 0.02
@@ -48,6 +50,9 @@ def outcome(run: Record, until: str, scheme: str | None = None) -> list[str]:
     if retries := run.info.get("retries"):
         found.append(f"retried: broke down {len(retries)} times, went on with smaller time steps")
     found += missing(run)
+    with suppress(RunFolderError):  # without particles the rest can be judged all the same
+        if len(run.times) and run.times[0] > 0:
+            found.append(f"incomplete: the snapshots before tU/D = {run.times[0]:.4g} are missing in particles.vtkhdf")
     if told := [f"at tU/D = {time:.4g} {told_changes(what)}" for time, what in changes(run)]:
         found.append(f"changed on the way: {'; '.join(told)}; averages may go across it")
     divergence, at_surface = run.divergence, has_surface(run.history)
