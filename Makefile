@@ -10,7 +10,7 @@ EXTENSION := python/alsph/_alsph.abi3.so
 SOURCES := Cargo.toml Cargo.lock pyproject.toml $(shell find rust -name '*.rs')
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
-.PHONY: build run wheel test test-rust test-python test-validation validate docs links bench clean mutants-python
+.PHONY: build run wheel test programs test-rust test-python test-validation validate docs links bench clean mutants-python
 
 build: $(EXTENSION)
 
@@ -18,7 +18,10 @@ run: $(EXTENSION)  ## The cylinder at a coarse resolution, in about three minute
 	$(BIN)/alsph run cylinder --resolution 10 --until 20 --output runs/cylinder --force
 	$(BIN)/alsph plot runs/cylinder
 
-test: test-rust test-python test-validation
+test: programs test-rust test-python test-validation
+
+programs: $(TOOLS)  ## The extension beside the engine's tests, since each leaves a core idle for minutes.
+	$(MAKE) $(EXTENSION) & building=$$!; cargo test --no-run; tested=$$?; wait $$building && exit $$tested
 
 test-rust: $(TOOLS)
 	cargo fmt --check

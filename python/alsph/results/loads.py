@@ -189,7 +189,8 @@ class Loads(Fields):
         """Return the mean |∇·u| of the fluid in snapshots of the window, in some of them where they are many."""
         path, found = self.file("particles.vtkhdf"), []
         with suppress(RunFolderError):  # without particles forces can be judged all the same
-            inside = np.flatnonzero((self.times >= self.window.start) & (self.times <= self.window.end))
+            first = max(self.window.start, np.nextafter(0.0, 1.0))  # at the start no step has ended
+            inside = np.flatnonzero((self.times >= first) & (self.times <= self.window.end))
             for step in inside[:: 1 + len(inside) // MOST_SNAPSHOTS]:
                 divergence, kind = reading.snapshot_fields(path, step, ("velocity_divergence", "kind"))
                 found.append(np.abs(divergence[kind == Kind.FLUID]).mean())
