@@ -652,7 +652,7 @@ def test_the_force_on_a_structure_is_of_both_halves_and_counts_from_the_water_on
     time = np.arange(1, 1201) * 0.01
 
     class Record:
-        path = Path("nowhere")
+        file = Path("nowhere").joinpath
         history = {
             "time": time,
             "time_step": np.full(len(time), 0.01),

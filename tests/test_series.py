@@ -45,7 +45,7 @@ class Record:
     """What a series asks of a run."""
 
     def __init__(self, path):
-        self.path = path
+        self.file = path.joinpath
 
 
 def recorded(path, times):
@@ -94,7 +94,7 @@ def test_gauges_that_were_moved_do_not_go_on_in_the_file_of_the_former_ones(tmp_
         (run.path / "case.toml").write_text(
             re.sub(r"gauges = \[.*?\]\n\]|gauges = .*", f"gauges = [{moved}]", text, flags=re.S, count=1)
         )
-        with pytest.raises(RunFolderError, match="gauges.csv: it holds depth at x = 0.2"):
+        with pytest.raises(RunFolderError, match="gauges.csv: holds depth at x = 0.2"):
             _ = alsph.open_run(run.path).gauges
     with pytest.warns(RuntimeWarning, match="gauges.csv holds .*at other places and is set aside as gauges.former.csv"):
         later = alsph.resume(run.path, until=0.4, progress=False)
