@@ -167,11 +167,12 @@ def lost(run: Record) -> list[str]:
 
 def crowded(history: Mapping[str, FloatArray]) -> list[str]:
     """Remark on fluid whose particles are not Δx apart, for which kernel, walls and masses are made."""
-    columns = (history.get(f"packing_{name}", np.empty(0)) for name in ("rms", "min", "max"))
-    rms, least, most = (float(np.mean(column[np.isfinite(column)] if column.size else np.nan)) for column in columns)
-    if not rms > PACKING:
+    rms = history.get("packing_rms", np.empty(0))
+    known = np.isfinite(rms)
+    if not known.any() or not (mean := float(rms[known].mean())) > PACKING:
         return []
-    text = f"{least:.3g} to {most:.3g} times as dense as particles Δx apart, {100 * rms:.2g} % off in the mean"
+    least, most = (float(history[f"packing_{name}"][known].mean()) for name in ("min", "max"))
+    text = f"{least:.3g} to {most:.3g} times as dense as particles Δx apart, {100 * mean:.2g} % off in the mean"
     return [f"packing: the fluid is {text}; is it placed with another spacing than 1/resolution?"]
 
 
