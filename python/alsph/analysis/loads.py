@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -46,10 +47,22 @@ class Divergence:
         The mean over the particles where steps end, of some snapshots in the window; NaN without any.
     """
 
+    NAMES: ClassVar[dict[str, str]] = {
+        "mean": "mean velocity divergence, |∇·u| D/U",
+        "at_end": "mean velocity divergence at the end of a step, |∇·u| D/U",
+        "max": "mean of the largest velocity divergence, |∇·u| D/U",
+    }
+    """What these are called among results."""
+
     mean: Estimate
     sum: Estimate
     max: Estimate
     at_end: Estimate
+
+    def told(self) -> dict[str, Estimate]:
+        """Return the results by name, without that of snapshots where there are none."""
+        found = {name: getattr(self, part) for part, name in self.NAMES.items()}
+        return {name: value for name, value in found.items() if value is not self.at_end or not np.isnan(value)}
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ def pressure_noise(snapshot: Snapshot, spacing: float) -> float:
     fields = np.column_stack([snapshot.pressure[fluid], white])
     if not judged.any():
         return float("nan")
-    around = with_images(position, fields, snapshot.domain, REACH * spacing) if snapshot.domain else (position, fields)
+    around = with_images(position, fields, snapshot.domain, REACH * spacing)
     smooth, _ = interpolate_parts(*around, position[judged], spacing)
     noise, unit = np.sqrt(np.mean((fields[judged] - smooth) ** 2, axis=0))
     return float(noise / unit)

@@ -120,21 +120,21 @@ def _fluid(snapshot: Snapshot, spacing: float) -> tuple[FloatArray, FloatArray]:
     """Return positions of the fluid with its images beyond periodic sides, velocity and pressure side by side."""
     fluid = snapshot.fluid
     position, fields = snapshot.position[fluid], np.column_stack([snapshot.velocity[fluid], snapshot.pressure[fluid]])
-    return with_images(position, fields, snapshot.domain, REACH * spacing) if snapshot.domain else (position, fields)
+    return with_images(position, fields, snapshot.domain, REACH * spacing)
 
 
 def velocity_gradient(snapshot: Snapshot, points: FloatArray, spacing: float) -> FloatArray:
     """Return the velocity gradient (m, d, d) of the fluid of a snapshot at points (m, d), those of buffers too."""
-    position, velocity = snapshot.position[snapshot.fluid], snapshot.velocity[snapshot.fluid]
-    if snapshot.domain:
-        position, velocity = with_images(position, velocity, snapshot.domain, REACH * spacing)
-    return interpolate_parts(position, velocity, points, spacing)[1]
+    position, fields = _fluid(snapshot, spacing)
+    return interpolate_parts(position, fields[:, :-1], points, spacing)[1]
 
 
 def with_images(
-    position: FloatArray, fields: FloatArray, domain: Domain, reach: float
+    position: FloatArray, fields: FloatArray, domain: Domain | None, reach: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return particles with the images of those at most `reach` away from the periodic sides of a domain."""
+    """Return particles with the images of those at most `reach` away from the periodic sides of a domain, if known."""
+    if domain is None:
+        return position, fields
     for axis in np.flatnonzero(domain.periodic).tolist():
         shift = np.eye(domain.dimensions)[axis] * domain.size[axis]
         along = position[:, axis]
@@ -312,7 +312,7 @@ def initial_state(state: dict[str, Any], run: Record, *, outlet: bool = True) ->
     if dimensions != own:
         raise ConfigError(f"initial_run = '{run.path}': it is in {dimensions}-D and this case in {own}-D")
     source, fields = _fluid(snapshot, run.spacing)
-    near = neighbour_tree(source).query(state["position"])[0] < VOID * run.spacing
+    near = distance(source, state["position"]) < VOID * run.spacing
     takers = {"velocity": [Kind.FLUID, *[Kind.OUTLET] * outlet], "pressure": [Kind.FLUID, Kind.INLET]}
     started = state | {name: state[name].copy() for name in takers}
     chosen = np.flatnonzero(near & (state["kind"] != Kind.SOLID))

@@ -69,6 +69,10 @@ class Window:
         """End of the window, tU/D (NaN if empty)."""
         return float(self.edges[-1]) if self.edges.size else np.nan
 
+    def holds(self, time: FloatArray) -> NDArray[np.bool_]:
+        """Return which times (n,) lie in the window or at its ends, none if it is empty."""
+        return np.asarray((time >= self.start) & (time <= self.end))
+
 
 def whole_record(time: FloatArray) -> Window:
     """Return the window of a flow that neither becomes steady nor periodic: all of its times tU/D (n,)."""

@@ -346,3 +346,13 @@ class _Overlay(io.RawIOBase):
     def close(self) -> None:
         self._file.close()
         super().close()
+
+
+def mark(path: Path) -> str:
+    """Return what changes with a file or folder, the time first; nothing for what is missing or a link."""
+    try:
+        found = os.lstat(path)
+    except OSError:
+        return ""
+    plain = stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)
+    return f"{found.st_mtime_ns:020d}.{found.st_size}.{found.st_ino}" if plain else ""

@@ -300,10 +300,11 @@ def snapshot_times(path: Path) -> FloatArray:
         return np.asarray(times, float)
 
 
-def snapshot_fields(path: Path, step: int, names: Sequence[str]) -> list[FloatArray]:
-    """Read fields of the particles of one snapshot of ``particles.vtkhdf``."""
+def snapshot_fields(path: Path, steps: Sequence[int], names: Sequence[str]) -> Iterator[list[FloatArray]]:
+    """Read fields of the particles of some snapshots of ``particles.vtkhdf``, of one at a time."""
     with _opened(path) as file:
-        return _fields(file, step, [f"PointData/{name}" for name in names])
+        for step in steps:
+            yield _fields(file, step, [f"PointData/{name}" for name in names])
 
 
 def _fields(file: h5py.File, step: int, names: Sequence[str]) -> list[FloatArray]:

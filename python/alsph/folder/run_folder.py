@@ -52,7 +52,9 @@ OWN = re.compile(
     r")\.(png|pdf|svg|gif|mp4|webm)"
 )
 """Names of the files that alsph makes in a run folder and its figures, and removes when the folder is replaced."""
-UNFINISHED = ("starting", "running", "interrupted")
+GOING_ON = ("starting", "running")
+"""What ``run.json`` says of a run that goes on."""
+UNFINISHED = (*GOING_ON, "interrupted")
 """What ``run.json`` says of a run that goes on or can go on."""
 SPARE_BYTES = 2 * 2**20
 """Room that must stay free on the disk beside what is written next."""

@@ -293,8 +293,7 @@ def _raster(
     if plane is not None:
         points, snapshot = plane.points(points), plane.near(snapshot, spacing)
     fluid, values = snapshot.position[snapshot.fluid], _values(snapshot, name, whole, spacing)
-    if whole.domain is not None:
-        fluid, values = sampling.with_images(fluid, values, whole.domain, sampling.REACH * spacing)
+    fluid, values = sampling.with_images(fluid, values, whole.domain, sampling.REACH * spacing)
     picture = sampling.average(fluid, values, points, spacing)
     if whole.domain is None or not meets_air(whole):
         return picture.reshape(shape), np.isfinite(picture).reshape(shape)

@@ -20,6 +20,7 @@ from alsph.arrays import AXES, FloatArray
 from alsph.config import Config, of_run
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
+from alsph.folder.durable import mark
 from alsph.geometry.particles import Snapshot, check_part
 from alsph.geometry.points import checked_box, checked_points
 from alsph.results import export
@@ -41,9 +42,9 @@ class Fields:
 
     path: Path
     case: dict[str, Any]
-
     info: dict[str, Any]
     _folder: Path
+    _seen = ""
 
     def file(self, name: str) -> Path:
         """Return a file or folder in the run folder, wherever the working directory has gone since it was opened.
@@ -53,12 +54,15 @@ class Fields:
         RunFolderError
             If another run has been made in the folder since.
         """
-        both = self.info, reading.info(self._folder / "run.json")
-        began = ((info.get("start"), info.get("segments", [])[:1]) for info in both)  # the particles, and the case
-        if any(one and other and one != other for one, other in zip(*began, strict=True)):
-            raise RunFolderError(
-                f"{self.path}: another run has been made there since this one was opened; open it anew"
-            )
+        written = self._folder / "run.json"
+        if (seen := mark(written)) != self._seen:
+            both = self.info, reading.info(written)
+            began = ((info.get("start"), info.get("segments", [])[:1]) for info in both)  # the particles, and the case
+            if any(one and other and one != other for one, other in zip(*began, strict=True)):
+                raise RunFolderError(
+                    f"{self.path}: another run has been made there since this one was opened; open it anew"
+                )
+            self._seen = seen
         return self._folder / name
 
     @property
@@ -285,7 +289,7 @@ class Fields:
         ConfigError
             If the box reaches out of the domain, or its faces go through a body in one of the snapshots.
         """
-        times = self.times[(self.times >= self.window.start) & (self.times <= self.window.end)]
+        times = self.times[self.window.holds(self.times)]
         box, domain = checked_box(lower, upper, self.config.case.space_dimensions), self.config.case.checked_domain
         if not domain.contains(np.array(box), 1e-9).all():
             whole = f"{list(domain.lower)} to {list(domain.upper)}"

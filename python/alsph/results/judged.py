@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
+from alsph.analysis.loads import Divergence
 from alsph.analysis.measures import Measure, Profile, alone
 from alsph.analysis.record import Record
 from alsph.cases import answers
@@ -27,8 +28,7 @@ OWN_NAMES = frozenset(
         *("Reynolds number", "resolution, D/Δx", "computing time", "time reached, tU/D", "iterations of a step"),
         *("averaged from tU/D", "averaged to tU/D", "averaging rule", "shedding periods"),
         *("share of the body that is computed", "artificial Mach number", "artificial Mach number of the penalty"),
-        *("mean velocity divergence, |∇·u| D/U", "mean velocity divergence at the end of a step, |∇·u| D/U"),
-        "mean of the largest velocity divergence, |∇·u| D/U",
+        *Divergence.NAMES.values(),
         *("sum of the velocity divergence, Σ|∇·u| D/U", "mean time step, ΔtU/Δx", "mean iterations"),
     )
 )
@@ -121,14 +121,11 @@ def _check_names(measures: Iterable[Measure], config: Config) -> None:
 
 def edited(run: Record, config: Config) -> dict[str, tuple[Any, Any]]:
     """Return what each parameter was that the run was made with, and what its file says now, where that is another."""
-    segments = run.info.get("segments", [])
-    made = [
-        of_the_flow(tables) for tables in (*(part["case"] for part in segments[-1:]), run.info.get("began")) if tables
-    ]
+    known = [*(part["case"] for part in run.info.get("segments", [])[-1:]), run.info.get("began")]
+    made = [of_the_flow(tables) for tables in known if tables]
     if not made:
         return {}
-    case = type(config.case)
-    defaults = {name: field.default for name, field in case.model_fields.items()}
+    defaults = {name: field.default for name, field in type(config.case).model_fields.items()}
     says = defaults | json.loads(json.dumps(config.flow_tables()))
     found = {}
     for name, value in says.items():

@@ -187,13 +187,12 @@ class Loads(Fields):
 
     def _divergence_at_end(self) -> Estimate:
         """Return the mean |∇·u| of the fluid in snapshots of the window, in some of them where they are many."""
-        path, found = self.file("particles.vtkhdf"), []
+        found = []
         with suppress(RunFolderError):  # without particles forces can be judged all the same
-            first = max(self.window.start, np.nextafter(0.0, 1.0))  # at the start no step has ended
-            inside = np.flatnonzero((self.times >= first) & (self.times <= self.window.end))
-            for step in inside[:: 1 + len(inside) // MOST_SNAPSHOTS]:
-                divergence, kind = reading.snapshot_fields(path, step, ("velocity_divergence", "kind"))
-                found.append(np.abs(divergence[kind == Kind.FLUID]).mean())
+            inside = np.flatnonzero(self.window.holds(self.times) & (self.times > 0))  # at the start no step has ended
+            some, names = inside[:: 1 + len(inside) // MOST_SNAPSHOTS].tolist(), ("velocity_divergence", "kind")
+            parts = reading.snapshot_fields(self.file("particles.vtkhdf"), some, names) if len(some) else []
+            found = [np.abs(divergence[kind == Kind.FLUID]).mean() for divergence, kind in parts]
         if not found:
             return Estimate(np.nan, note="no snapshot between these times")
         return Estimate(np.mean(found), note=f"of {len(found)} snapshots")
@@ -203,7 +202,7 @@ class Loads(Fields):
         """Mean pressure coefficient (22) on the surface."""
         angle, time, samples = reading.surface(self.file("surface.h5"))
         mean, deviation = averages.mean_profile(time, samples, self.window)
-        inside = np.count_nonzero((time >= self.window.start) & (time <= self.window.end))
+        inside = np.count_nonzero(self.window.holds(time))
         surface = reading.surface_points(self.file("surface.h5"))
         if surface is None:  # of an older version, be it at the same points
             case = self.config.case.surface_points()

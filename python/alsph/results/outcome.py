@@ -15,6 +15,7 @@ from alsph.cases.free_surface import ENERGY
 from alsph.cases.method import DIFFUSION
 from alsph.config import of_the_flow
 from alsph.errors import RunFolderError
+from alsph.folder.run_folder import GOING_ON
 from alsph.text import shown
 
 DIVERGENCE = 0.02
@@ -68,7 +69,7 @@ def outcome(run: Record, until: str, scheme: str | None = None) -> list[str]:
         where = ""
         if largest > 2 * divergence.mean:
             where = f" where steps end, {float(divergence.mean):.2g} where they take their derivatives"
-            if _apart(run, scheme):
+            if _apart(run):
                 remedy = "derivatives in the middle of a step, as those of alsph and isph by default, leave less"
         found.append(f"not divergence-free: mean |∇·u| = {float(largest):.2g} U/D{where}; {remedy}")
     found += [*lost(run), *crowded(run.history), *thinned(run.history), *backflow(run)]
@@ -79,10 +80,9 @@ def outcome(run: Record, until: str, scheme: str | None = None) -> list[str]:
     return found
 
 
-def _apart(run: Record, scheme: str | None) -> bool:
-    """Whether a scheme takes its derivatives elsewhere than in the middle of a step."""
-    made = [part["case"].get("algorithm") for part in run.info.get("segments", [])[-1:]]
-    return scheme in ("shadloo", "sisph") or any(algorithm in (1, 2, "original") for algorithm in made)
+def _apart(run: Record) -> bool:
+    """Whether a run's steps took their derivatives elsewhere than in the middle."""
+    return any(part["case"].get("algorithm") in (1, 2, "original") for part in run.info.get("segments", [])[-1:])
 
 
 def missing(run: Record) -> list[str]:
@@ -91,7 +91,7 @@ def missing(run: Record) -> list[str]:
     if not len(steps):
         return []
     made = int(steps[-1])
-    if run.status not in ("starting", "running"):
+    if run.status not in GOING_ON:
         made = max(made, int(run.info.get("step", 0)))
     if not (lost := made - len(steps)):
         return []
@@ -187,8 +187,7 @@ def thinned(history: Mapping[str, FloatArray]) -> list[str]:
 
 def backflow(run: Record) -> list[str]:
     """Remark on fluid that comes back through an outlet, of which nothing is known but the fluid beside it."""
-    history, window = run.history, run.window
-    inside = (history["time"] >= window.start) & (history["time"] <= window.end)
+    history, inside = run.history, run.window.holds(run.history["time"])
     returning, buffer = (history.get(name, np.zeros(len(inside)))[inside] for name in ("returning", "outlet"))
     if not buffer.sum() or (share := returning.sum() / buffer.sum()) < BACKFLOW:
         return []
@@ -217,13 +216,13 @@ def ended_early(run: Record) -> list[str]:
 
     They count as converged; of those that do not :func:`unsolved` tells.
     """
-    history, window = run.history, run.window
+    history = run.history
     residual = history.get("residual", np.empty(0))
     looked = np.isfinite(residual)
     if not looked.any():
         return []
     ended = looked & (history["converged"] != 0)
-    inside = ended & (history["time"] >= window.start) & (history["time"] <= window.end)
+    inside = ended & run.window.holds(history["time"])
     if not inside.any() or (mean := residual[inside].mean()) < UNSOLVED:
         return []
     text = f"Jacobi's iteration ended by the change of the pressure; the residual is {mean:.2g} in the mean"

@@ -24,7 +24,7 @@ from alsph.cases.source import shown_name
 from alsph.errors import ConfigError, RunFolderError
 from alsph.folder import reading
 from alsph.folder.durable import check_folder
-from alsph.folder.run_folder import RunFolder
+from alsph.folder.run_folder import GOING_ON, RunFolder
 from alsph.geometry.particles import Field, Snapshot
 from alsph.geometry.plane import Plane
 from alsph.parameters import choose
@@ -72,10 +72,13 @@ class Run(Loads):
         self._folder = self.path.absolute()
         self.case: dict[str, Any] = reading.case(self.path / "case.toml")
         self.info: dict[str, Any] = reading.info(self.path / "run.json")
-        if self.status in ("starting", "running") and RunFolder(self.path).is_busy() is False:
+        if self._goes_on() and RunFolder(self.path).is_busy() is False:
             self.info = reading.info(self.path / "run.json")  # it may just have ended
-            if self.status in ("starting", "running"):
+            if self._goes_on():
                 self.info |= {"status": "stopped", "message": self._how_to_go_on()}
+
+    def _goes_on(self) -> bool:
+        return self.info.get("status") in GOING_ON
 
     def _how_to_go_on(self) -> str:
         """Return what to say of a run that has neither ended nor a process at work in it."""
@@ -205,10 +208,7 @@ class Run(Loads):
             results["shedding periods"] = self.window.periods
         if (share := self.config.case.computed_share) < 1:
             results["share of the body that is computed"] = share
-        results["mean velocity divergence, |∇·u| D/U"] = self.divergence.mean
-        if not np.isnan(self.divergence.at_end):
-            results["mean velocity divergence at the end of a step, |∇·u| D/U"] = self.divergence.at_end
-        results["mean of the largest velocity divergence, |∇·u| D/U"] = self.divergence.max
+        results |= self.divergence.told()
         if np.isfinite(self.config.case.expected_penalty_constant()):
             waves = "" if self.config.case.is_weakly_compressible else " of the penalty"
             results[f"artificial Mach number{waves}"] = Estimate(mach_number(self.history))

@@ -15,6 +15,7 @@ import numpy as np
 
 from alsph import plotting
 from alsph.analysis.averages import Estimate, remark
+from alsph.analysis.loads import Divergence
 from alsph.analysis.measures import Profile
 from alsph.analysis.window import DEVELOPING
 from alsph.cases.remarks import keywords, tally
@@ -36,10 +37,9 @@ if TYPE_CHECKING:
 
     from alsph.cases import Case
 
-DIVERGENCE = "mean velocity divergence, |∇·u| D/U"
 OF_ALL_RUNS = (
-    DIVERGENCE,
-    "mean velocity divergence at the end of a step, |∇·u| D/U",
+    Divergence.NAMES["mean"],
+    Divergence.NAMES["at_end"],
     "sum of the velocity divergence, Σ|∇·u| D/U",
     "shedding periods",
     "steps",
@@ -364,7 +364,7 @@ SNAPSHOTS_AT_LIFT = 10
 def _time_of_largest_lift(run: Run) -> float | None:
     """Return the time of that of the last snapshots in the window at which the lift is largest; None without lift."""
     lift = run.coefficient("y")
-    settled = run.times[(run.times >= run.window.start) & (run.times <= run.window.end)]
+    settled = run.times[run.window.holds(run.times)]
     times = (settled if len(settled) else run.times)[-SNAPSHOTS_AT_LIFT:]
     if not len(times) or not np.isfinite(lift).any():
         return None

@@ -3,8 +3,6 @@
 import io
 import json
 import math
-import os
-import stat
 import time as clock
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +16,7 @@ from alsph.analysis.averages import Estimate
 from alsph.arrays import FloatArray
 from alsph.cases.source import shown_name
 from alsph.errors import RunFolderError
+from alsph.folder.durable import mark
 from alsph.folder.reading import History
 from alsph.plotting.histories import robust_limits
 from alsph.results.outcome import has_surface
@@ -75,7 +74,7 @@ class Watched:
         self._drawing = Lock()
 
     def _now(self) -> tuple[object, ...]:
-        return tuple(_mark(self.path / name) for name in FILES)
+        return tuple(mark(self.path / name) for name in FILES)
 
     def state(self) -> bytes:
         """Return as JSON how far the run is, its curves, and what there is to be drawn."""
@@ -102,7 +101,7 @@ class Watched:
                 *_tried(problems, lambda: _numerics(run), []),
             ],
             "fields": list(plotting.FIELDS),
-            "snapshot": _mark(self.path / "particles.vtkhdf"),
+            "snapshot": mark(self.path / "particles.vtkhdf"),
             "figures": self._figures(),
             "problems": list(dict.fromkeys(problems)),
         }
@@ -146,7 +145,7 @@ class Watched:
             with self._drawing:
                 return _png(run, field, WIDTHS[width], INKS[ink])
 
-        return self._pictures[field, width, ink].get(_mark(self.path / "particles.vtkhdf"), draw)
+        return self._pictures[field, width, ink].get(mark(self.path / "particles.vtkhdf"), draw)
 
     def figure(self, name: str) -> tuple[str, bytes]:
         """Return kind and content of one of the run's figures.
@@ -167,21 +166,11 @@ class Watched:
         try:
             if folder.is_symlink():
                 return []
-            marks = {entry: _mark(entry) for entry in folder.iterdir() if entry.suffix in FIGURES}
+            marks = {entry: mark(entry) for entry in folder.iterdir() if entry.suffix in FIGURES}
         except OSError:  # none have been drawn yet
             return []
         newest = sorted((mark, entry.name) for entry, mark in marks.items() if mark)
         return [{"name": name, "of": mark} for mark, name in reversed(newest)]
-
-
-def _mark(path: Path) -> str:
-    """Return what changes with a file or folder, the time first; nothing for what is missing or a link."""
-    try:
-        found = os.lstat(path)
-    except OSError:
-        return ""
-    plain = stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)
-    return f"{found.st_mtime_ns:020d}.{found.st_size}.{found.st_ino}" if plain else ""
 
 
 def _tried(problems: list[str], make: Callable[[], Any], otherwise: Any) -> Any:
