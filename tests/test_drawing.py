@@ -160,6 +160,27 @@ def test_what_is_no_outline_is_refused_by_its_file(tmp_path, name, content, mess
         Body(shape=str(tmp_path / name))
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "place"),
+    [
+        ("a.svg", SVG.format('<path d="M10 20L60 20L60 70L10 60"/>'), "it ends at (10, 20)"),
+        ("a.svg", SVG.format('<path d="M10 20H60V70H10Z"/><path d="M40 60H90V90H40Z"/>'), "overlap at (50, 65)"),
+        ("a.svg", SVG.format('<path d="M10 20L50 80L50 20L10 80Z"/>'), "at (30, 50)"),
+        ("a.dxf", dxf(lambda _, space: space.add_line((40, 60), (70, 75))), "it ends at (40, 60)"),
+        (
+            "a.geojson",
+            '{"type": "MultiPolygon", "coordinates": [[[[10, 20], [60, 20], [60, 70], [10, 70], [10, 20]]],'
+            "[[[40, 60], [90, 60], [90, 90], [40, 90], [40, 60]]]]}",
+            "overlap at (50, 65)",
+        ),
+    ],
+)
+def test_faults_are_told_by_where_they_are_in_the_drawing(tmp_path, name, content, place):
+    with pytest.raises(ConfigError) as refusal:
+        drawn(tmp_path, name, content)
+    assert place in str(refusal.value), refusal.value
+
+
 CIRCLES = {
     "arcs": ('<path d="M30 50A20 20 0 1 1 70 50A20 20 0 1 1 30 50Z" transform="{}"/>', 400 * np.pi),
     "circle": ('<circle cx="50" cy="50" r="20" transform="{}"/>', 400 * np.pi),
@@ -335,7 +356,7 @@ def test_lines_drawn_twice_are_taken_once(tmp_path):
         (
             "a.svg",
             SVG.format('<path d="M0 0h20v20h-20z"/><path d="M50 3L70 20L70 3L50 20"/><path d="M50 20L50 3"/>'),
-            r"\(50, -3\)",
+            r"\(50, 3\)",
         ),
         (
             "a.dxf",

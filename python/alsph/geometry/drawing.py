@@ -5,8 +5,10 @@ Curves within curves are holes in them, by the even-odd rule, whatever a drawing
 
 import io
 import json
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -48,13 +50,41 @@ UNREAD = ("clip-path", "mask", "transform-origin", "transform")
 """Attributes and styles of SVG that are not followed, but for the attribute ``transform``."""
 
 
+PLACE = re.compile(r"\(([-+.e\d]+), ([-+.e\d]+)\)")
+"""A place in a message."""
+
+
+@dataclass
+class Frame:
+    """Where in a drawing what is read of it lies."""
+
+    corner: FloatArray
+    """The lower left one, y upwards (2,)."""
+    extent: float
+    up: float
+    """1, or −1 if y goes downwards in the drawing."""
+
+    def of(self, curve: FloatArray) -> FloatArray:
+        """Return points of the drawing, y upwards, with its larger extent 1 and its lower left corner 0."""
+        return (curve - self.corner) / self.extent
+
+    def told(self, x: float, y: float) -> str:
+        """Return such a point in the drawing's own coordinates."""
+        x, y = np.array([x, y]) * self.extent + self.corner
+        return f"({x:.6g}, {self.up * y:.6g})"
+
+    def translated(self, text: str) -> str:
+        """Return a message with the places in it in the drawing's own coordinates."""
+        return PLACE.sub(lambda place: self.told(float(place[1]), float(place[2])), text)
+
+
 def is_drawing(path: Path) -> bool:
     """Whether a file is one, by its name."""
     return path.suffix.lower() in READERS
 
 
-def read(path: Path) -> tuple[list[shapely.Polygon], str]:
-    """Return what the curves of a drawing go around, its larger extent 1, y upwards, and what is to be said of it.
+def read(path: Path) -> tuple[list[shapely.Polygon], str, Frame]:
+    """Return what the curves of a drawing go around, what is to be said of it, and where in the drawing that lies.
 
     Raises
     ------
@@ -84,13 +114,15 @@ def read(path: Path) -> tuple[list[shapely.Polygon], str]:
     extent = float((upper - lower).max())
     if not np.isfinite(points).all() or not extent > 0:
         raise ConfigError(f"{name}: its coordinates are no lengths")
-    bodies = _closed([(curve - lower) / extent for curve in curves], lambda at: at * extent + lower, name)
-    unit = "pixels of 1/96 inch" if path.suffix.lower() == ".svg" else "units of the file"
+    svg = path.suffix.lower() == ".svg"
+    frame = Frame(lower, extent, -1.0 if svg else 1.0)
+    bodies = _closed([frame.of(curve) for curve in curves], frame, name)
+    unit = "pixels of 1/96 inch" if svg else "units of the file"
     size = f"its larger extent is {extent:.6g} {unit}, and D, or as many D as `scale` says"
-    return bodies, "; ".join([size, *said])
+    return bodies, "; ".join([size, *said]), frame
 
 
-def _closed(curves: list[FloatArray], back: Callable[[FloatArray], FloatArray], name: str) -> list[shapely.Polygon]:
+def _closed(curves: list[FloatArray], frame: Frame, name: str) -> list[shapely.Polygon]:
     """Return what the curves go around; those that are open are joined where their ends meet, each taken once."""
     ends = [float(np.hypot(*(curve[-1] - curve[0]))) for curve in curves]
     drawn = [
@@ -103,13 +135,13 @@ def _closed(curves: list[FloatArray], back: Callable[[FloatArray], FloatArray], 
     lines = _coarse([shapely.LineString(curve) for curve in rest])
     once = dict(zip(shapely.normalize(lines), lines, strict=True))  # whichever way they are drawn
     found, cuts, dangles, crossing = shapely.polygonize_full(list(once.values()))
-    ending = "is not closed, it ends at ({}, {}); close it, or take it out"
-    meeting = "through ({}, {}) meets itself; draw it without a crossing, and each of its lines once"
+    ending = "is not closed, it ends at {}; close it, or take it out"
+    meeting = "through {} meets itself; draw it without a crossing, and each of its lines once"
     for parts, fault in ((dangles, ending), (cuts, ending), (crossing, meeting)):
         if not parts.is_empty:
             tips = np.concatenate([curve[[0, -1]] for curve in rest])
-            x, y = back(min(tips, key=lambda tip: float(np.hypot(*(tip - shapely.get_coordinates(parts)[0])))))
-            raise ConfigError(f"{name}: a curve {fault.format(f'{x:.6g}', f'{y:.6g}')}")
+            tip = min(tips, key=lambda tip: float(np.hypot(*(tip - shapely.get_coordinates(parts)[0]))))
+            raise ConfigError(f"{name}: a curve {fault.format(frame.told(*tip))}")
     return [*closed, *(shapely.Polygon(part.exterior) for part in shapely.get_parts(found))]
 
 

@@ -53,12 +53,13 @@ class Outline(Shape):
         """
         name = printable(os.path.basename(path))
         if drawing.is_drawing(Path(path)):
-            bodies, remark = drawing.read(Path(path))
+            bodies, remark, frame = drawing.read(Path(path))
             try:
                 found = cls.of(bodies)
             except ConfigError as error:
-                raise ConfigError(f"{name}: {error}, as seen from its lower left corner; {remark}") from None
-            remarks = "; ".join(filter(None, (remark, found.remark)))
+                fault = frame.translated(str(error).removeprefix("points: "))
+                raise ConfigError(f"{name}: {fault}; {remark}") from None
+            remarks = "; ".join(filter(None, (remark, frame.translated(found.remark))))
             return cls(file=name, sha256=found.sha256, points=found.points, remark=remarks)
         return cls._around(curves(decoded(path), name), name)
 
