@@ -49,9 +49,9 @@ class Units(Parameters):
 
     Examples
     --------
-    >>> water = Units(length=0.02, velocity=0.1, density=1000, kinematic_viscosity=1e-6)
+    >>> water = Units(length=0.5, velocity=0.25, density=1000, kinematic_viscosity=1e-6)
     >>> water.reynolds, water.factor("time"), water.factor("force_per_length")
-    (2000.0, 0.2, 0.2)
+    (125000.0, 2.0, 31.25)
     """
 
     length: float = Field(gt=0, description="reference length D [m]")

@@ -234,6 +234,8 @@ def mean_profile(time: FloatArray, profiles: FloatArray, window: Window) -> tupl
         Sample times tU/D.
     profiles : ndarray, shape (k, m)
         One profile a sample.
+    window : Window
+        What is averaged over.
 
     Returns
     -------
