@@ -166,6 +166,7 @@ def test_what_is_no_outline_is_refused_by_its_file(tmp_path, name, content, mess
         ("a.svg", SVG.format('<path d="M10 20L60 20L60 70L10 60"/>'), "it ends at (10, 20)"),
         ("a.svg", SVG.format('<path d="M10 20H60V70H10Z"/><path d="M40 60H90V90H40Z"/>'), "overlap at (50, 65)"),
         ("a.svg", SVG.format('<path d="M10 20L50 80L50 20L10 80Z"/>'), "at (30, 50)"),
+        ("a.svg", SVG.format('<path d="M10 0L60 20"/>'), "it ends at (10, 0)"),
         ("a.dxf", dxf(lambda _, space: space.add_line((40, 60), (70, 75))), "it ends at (40, 60)"),
         (
             "a.geojson",

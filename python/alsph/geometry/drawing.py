@@ -70,8 +70,8 @@ class Frame:
 
     def told(self, x: float, y: float) -> str:
         """Return such a point in the drawing's own coordinates."""
-        x, y = np.array([x, y]) * self.extent + self.corner
-        return f"({x:.6g}, {self.up * y:.6g})"
+        x, y = (np.array([x, y]) * self.extent + self.corner) * (1.0, self.up) + 0.0  # no -0
+        return f"({x:.6g}, {y:.6g})"
 
     def translated(self, text: str) -> str:
         """Return a message with the places in it in the drawing's own coordinates."""
